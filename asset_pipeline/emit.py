@@ -1,0 +1,173 @@
+"""Write an asset folder: meshes, `model.xml`, `asset.json`, all or nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import trimesh
+
+from asset_pipeline.assets import MODEL_FILE, Asset, read_asset, write_asset_json
+from asset_pipeline.geometry import Body, MassProperties, Shape
+from manipose_mj.poses import pose_to_vector
+
+COLLISION_GROUP = "3"
+VISUAL_GROUP = "2"
+
+
+def write_asset(asset: Asset, bodies: tuple[Body, ...]) -> Asset:
+    """Write the folder `asset.folder` and return the asset as read back from it.
+
+    The folder appears whole by one rename, so a reader never sees half of it and a killed writer
+    leaves the old one. The first body is the base; a rigid object has only that one.
+
+    Args:
+      asset: What `asset.json` will say; its `folder` is where to write.
+      bodies: The base and, for articulated objects, one body per moving part.
+    """
+    folder = asset.folder
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        root = model_element(asset.name, bodies, staging)
+        ElementTree.indent(root, " ")
+        ElementTree.ElementTree(root).write(staging / MODEL_FILE, encoding="unicode")
+        write_asset_json(replace(asset, folder=staging))
+        staging.chmod(0o755)
+        _swap(staging, folder)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return read_asset(folder)
+
+
+def _swap(staging: Path, folder: Path) -> None:
+    """Put `staging` where `folder` is; another process may be doing the same with equal content."""
+    while True:
+        try:
+            os.rename(staging, folder)
+            return
+        except OSError:
+            if not folder.is_dir():
+                raise
+            retired = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+            try:
+                os.rename(folder, retired / "old")
+            except FileNotFoundError:
+                pass
+            shutil.rmtree(retired, ignore_errors=True)
+
+
+def model_element(name: str, bodies: tuple[Body, ...], folder: Path) -> ElementTree.Element:
+    """The MJCF of an object; its meshes and textures are written under `folder/meshes`.
+
+    A rigid object's base has a free joint; an articulated object's base is fixed to the world.
+    """
+    (folder / "meshes").mkdir(exist_ok=True)
+    root = ElementTree.Element("mujoco", model=name)
+    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
+    assets = ElementTree.SubElement(root, "asset")
+    world = ElementTree.SubElement(root, "worldbody")
+    base, *parts = bodies
+    base_element = _body_element(world, assets, base, folder)
+    if not parts:
+        base_element.insert(0, ElementTree.Element("freejoint", name="free"))
+    for part in parts:
+        assert part.joint is not None
+        element = _body_element(base_element, assets, part, folder)
+        joint = ElementTree.Element(
+            "joint",
+            name=part.name,
+            type=part.joint.kind,
+            pos=_numbers(part.joint.origin),
+            axis=_numbers(part.joint.axis),
+            range=_numbers(part.joint.range),
+            frictionloss=_numbers([part.joint.frictionloss]),
+            damping=_numbers([part.joint.damping]),
+            armature="0.001",
+            # A stop that gives way under a pull lets a drawer creep out of its cabinet.
+            solreflimit="0.01 1",
+        )
+        element.insert(0, joint)
+    return root
+
+
+def _body_element(
+    parent: ElementTree.Element, assets: ElementTree.Element, body: Body, folder: Path
+) -> ElementTree.Element:
+    element = ElementTree.SubElement(parent, "body", name=body.name)
+    element.append(_inertial_element(body.mass_properties))
+    for index, shape in enumerate(body.collision):
+        geom = _geom_element(element, assets, shape, f"{body.name}_collision_{index:02d}", folder)
+        geom.set("group", COLLISION_GROUP)
+        geom.set("condim", "4")
+        geom.set("friction", _numbers(body.friction))
+        geom.set("rgba", "0.3 0.6 0.9 0.4")
+    for index, shape in enumerate(body.visual):
+        geom = _geom_element(element, assets, shape, f"{body.name}_visual_{index:02d}", folder)
+        geom.set("group", VISUAL_GROUP)
+        geom.set("contype", "0")
+        geom.set("conaffinity", "0")
+        geom.set("mass", "0")
+        if shape.texture is None:
+            geom.set("rgba", _numbers(shape.rgba))
+    return element
+
+
+def _inertial_element(properties: MassProperties) -> ElementTree.Element:
+    i = properties.inertia
+    return ElementTree.Element(
+        "inertial",
+        pos=_numbers(properties.center_of_mass),
+        mass=_numbers([properties.mass]),
+        fullinertia=_numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
+    )
+
+
+def _geom_element(
+    parent: ElementTree.Element,
+    assets: ElementTree.Element,
+    shape: Shape,
+    name: str,
+    folder: Path,
+) -> ElementTree.Element:
+    geom = ElementTree.SubElement(parent, "geom", name=name, type=shape.kind)
+    if shape.kind != "mesh":
+        vector = pose_to_vector(shape.pose)
+        geom.set("size", _numbers(shape.size))
+        geom.set("pos", _numbers(vector[:3]))
+        geom.set("quat", _numbers(vector[3:]))
+        return geom
+    assert shape.mesh is not None
+    file = f"meshes/{name}.obj"
+    write_obj(shape.mesh, folder / file)
+    ElementTree.SubElement(assets, "mesh", name=name, file=file, inertia="shell")
+    geom.set("mesh", name)
+    if shape.texture is not None:
+        image = f"meshes/{name}.png"
+        shutil.copyfile(shape.texture, folder / image)
+        (folder / image).chmod(0o644)
+        ElementTree.SubElement(assets, "texture", name=name, type="2d", file=image)
+        ElementTree.SubElement(assets, "material", name=name, texture=name, specular="0.2")
+        geom.set("material", name)
+    return geom
+
+
+def write_obj(mesh: trimesh.Trimesh, path: Path) -> None:
+    """A Wavefront OBJ with micrometre coordinates and, where the mesh has them, texture coordinates."""
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.asarray(mesh.vertices)]
+    uv = getattr(mesh.visual, "uv", None)
+    if uv is None:
+        lines += [f"f {a} {b} {c}" for a, b, c in np.asarray(mesh.faces) + 1]
+    else:
+        lines += [f"vt {u:.5f} {v:.5f}" for u, v in np.asarray(uv)]
+        lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in np.asarray(mesh.faces) + 1]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _numbers(values) -> str:
+    return " ".join(f"{float(v):.9g}" for v in values)

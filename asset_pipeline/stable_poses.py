@@ -1,0 +1,154 @@
+"""The ways an object rests on a horizontal plane."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from asset_pipeline.assets import StablePose
+from asset_pipeline.emit import model_element
+from asset_pipeline.geometry import Body
+from asset_pipeline.labelling.label import PoseLabel
+from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotation
+
+MIN_PROBABILITY = 0.02
+# Facets of a curved side are nearer to each other than this; faces of a box are not.
+MERGE_ANGLE = np.deg2rad(12.0)
+MAX_TILT = np.deg2rad(5.0)
+SETTLE_TIME = 1.5
+TIMESTEP = 0.002
+
+
+def stable_poses(
+    surface: trimesh.Trimesh,
+    center_of_mass: Float[np.ndarray, "3"],
+    *,
+    label: PoseLabel | None = None,
+) -> tuple[StablePose, ...]:
+    """Quasi-static resting poses on the faces of the convex hull, most probable first.
+
+    Poses that differ by a turn about the vertical, by a symmetry of the label or by the facets of
+    one curved side are one pose; the most probable of them stands for all and gets their sum. Those
+    under 2 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose statistics"
+    (IEEE T-RA 1999), computed by trimesh.
+
+    Args:
+      surface: What touches the plane, in the object frame [m].
+      center_of_mass: `(3,)` in the object frame [m], inside the hull of `surface`.
+      label: Its symmetry group says which poses are alike; without one none are.
+
+    Raises:
+      InputError: The surface has no volume, or the centre of mass lies outside its hull.
+    """
+    hull = _hull(surface)
+    center = np.asarray(center_of_mass, float)
+    inside = np.einsum("fi,fi->f", hull.triangles_center - center, hull.face_normals)
+    if inside.min() <= 0:
+        raise InputError(
+            f"centre of mass {np.round(center, 4).tolist()} lies outside the object's convex hull"
+        )
+    transforms, probabilities = trimesh.poses.compute_stable_poses(
+        hull, center_mass=center, sigma=0.0, n_samples=1, seed=0
+    )
+    order = np.lexsort((*transforms[:, 2, :3].T.round(3), -probabilities.round(6)))
+    merged = _merge(transforms[order], probabilities[order], label)
+    kept = [(t, p) for t, p in merged if p >= MIN_PROBABILITY] or merged[:1]
+    total = sum(p for _, p in kept)
+    poses = [_stable_pose(t[:3, :3], p / total, hull) for t, p in kept]
+    return tuple(sorted(poses, key=lambda p: -round(p.probability, 6)))
+
+
+def verified(
+    poses: Sequence[StablePose], body: Body, *, label: PoseLabel | None = None
+) -> tuple[StablePose, ...]:
+    """Those of `poses` in which the body still stands after 1.5 s of MuJoCo, renormalised.
+
+    A pose fails when the body's up has tilted by more than 5 degrees, symmetries apart.
+
+    Raises:
+      InputError: None of them stands.
+    """
+    model = _model(body)
+    data = mujoco.MjData(model)
+    standing = [p for p in poses if _tilt_after_settling(model, data, p, label) < MAX_TILT]
+    if not standing:
+        raise InputError(f"body {body.name!r} topples from every one of its {len(poses)} rest poses")
+    total = sum(p.probability for p in standing)
+    return tuple(replace(p, probability=p.probability / total) for p in standing)
+
+
+def tilt(
+    a: Float[np.ndarray, "3 3"], b: Float[np.ndarray, "3 3"], label: PoseLabel | None
+) -> float:
+    """Angle [rad] between the ups of two rest rotations `R_world_object`, least over the symmetries."""
+    group = SymmetryGroup.identity() if label is None else label.symmetry
+    frame = np.eye(3) if label is None else label.rotation
+    up_a, up_b = a[2] @ frame, b[2] @ frame
+    ups = up_a @ group.rotations
+    if group.axial:  # compare heights along the axis: the turn about it is free
+        along = np.arccos(np.clip(ups[:, 0], -1, 1)) - np.arccos(np.clip(up_b[0], -1, 1))
+        return float(np.abs(along).min())
+    chord = np.linalg.norm(ups - up_b, axis=1) / 2
+    return float(2 * np.arcsin(np.clip(chord, 0, 1)).min())
+
+
+def _merge(
+    transforms: Float[np.ndarray, "n 4 4"],
+    probabilities: Float[np.ndarray, "n"],
+    label: PoseLabel | None,
+) -> list[tuple[np.ndarray, float]]:
+    merged: list[tuple[np.ndarray, float]] = []
+    for transform, probability in zip(transforms, probabilities, strict=True):
+        for index, (kept, total) in enumerate(merged):
+            if tilt(transform[:3, :3], kept[:3, :3], label) < MERGE_ANGLE:
+                merged[index] = (kept, total + float(probability))
+                break
+        else:
+            merged.append((transform, float(probability)))
+    return merged
+
+
+def _stable_pose(
+    rotation: Float[np.ndarray, "3 3"], probability: float, hull: trimesh.Trimesh
+) -> StablePose:
+    lowest = (np.asarray(hull.vertices) @ rotation[2]).min()
+    return StablePose(rotation=rotation, height=float(-lowest), probability=probability)
+
+
+def _hull(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    try:
+        return surface.convex_hull
+    except Exception:  # qhull's own type, for flat or empty input
+        raise InputError("surface has no convex hull; expected a solid object") from None
+
+
+def _model(body: Body) -> mujoco.MjModel:
+    """The body above a plane, from the same MJCF that its asset folder holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = model_element(body.name, (replace(body, visual=()),), Path(folder))
+        ElementTree.SubElement(root, "option", timestep=str(TIMESTEP))
+        world = root.find("worldbody")
+        assert world is not None
+        ElementTree.SubElement(world, "geom", type="plane", size="0 0 0.1")
+        path = Path(folder) / "rest.xml"
+        ElementTree.ElementTree(root).write(path, encoding="unicode")
+        return mujoco.MjModel.from_xml_path(str(path))
+
+
+def _tilt_after_settling(
+    model: mujoco.MjModel, data: mujoco.MjData, pose: StablePose, label: PoseLabel | None
+) -> float:
+    mujoco.mj_resetData(model, data)
+    data.qpos[:7] = pose_to_vector(pose.pose)
+    for _ in range(int(SETTLE_TIME / TIMESTEP)):
+        mujoco.mj_step(model, data)
+    return tilt(quaternion_to_rotation(data.qpos[3:7]), pose.rotation, label)

@@ -1,0 +1,28 @@
+"""The error that a person's input can cause."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """Input that cannot be used; the message is one line: what, where, and what would be right.
+
+    The command line prints it without a traceback and exits with code 2.
+    """
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
+    """An `InputError` for a misspelt name, offering the nearest valid ones.
+
+    Args:
+      kind: What the name stands for, such as `"task"`.
+      name: The name as it was given.
+      valid: Every name that would have been right.
+    """
+    names = sorted(valid)
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if near:
+        return InputError(f"unknown {kind} {name!r}; did you mean {', '.join(near)}?")
+    return InputError(f"unknown {kind} {name!r}; known: {', '.join(names) or 'none'}")

@@ -1,0 +1,183 @@
+"""What an evaluation leaves on disk: one JSON line per episode, and one trajectory file.
+
+Both are written so that a process killed at any instant leaves only whole records behind, but for
+one line at the end of `results.jsonl`, which the reader drops.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.errors import InputError
+
+STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics")
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """How one episode ended; every field but `wall_s` repeats bit for bit from the seed.
+
+    Attributes:
+      task: `"domain/task"`.
+      episode: Index within the evaluation, from 0.
+      seed: The episode's own seed.
+      object: Name of the manipulated asset.
+      pose_source: Where the baseline took object poses from, such as `"oracle"`.
+      success_once: The goal was met at some control step.
+      success_at_end: The goal was met when the episode ended.
+      failure: A member of `STAGES`, or None on success at the end.
+      reason: One line that says what failed; empty on success.
+      translation_error: Symmetric pose error to the goal at the end [m], None where it has no meaning.
+      rotation_error: The same for the rotation [rad].
+      steps: Control steps taken.
+      sim_time: Simulated time [s].
+      max_penetration: Deepest contact over the episode [m].
+      wall_s: Wall-clock time [s].
+    """
+
+    task: str
+    episode: int
+    seed: int
+    object: str
+    pose_source: str
+    success_once: bool
+    success_at_end: bool
+    failure: str | None
+    reason: str
+    translation_error: float | None
+    rotation_error: float | None
+    steps: int
+    sim_time: float
+    max_penetration: float
+    wall_s: float
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """What names the episode within an evaluation."""
+        return self.task, self.episode
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Enough of an episode to draw it again.
+
+    Attributes:
+      times: `(t,)` [s], about every 0.1 s.
+      qpos: `(t, nq)`, the model's generalized positions.
+      annotations: `t` strings, the primitive under way at each instant.
+    """
+
+    times: Float[np.ndarray, "t"]
+    qpos: Float[np.ndarray, "t nq"]
+    annotations: list[str]
+
+
+def to_line(result: EpisodeResult) -> str:
+    """The result as one line of JSON, with its newline."""
+    return json.dumps(asdict(result), allow_nan=False) + "\n"
+
+
+def from_line(line: str) -> EpisodeResult:
+    """The result that `to_line` wrote.
+
+    Raises:
+      ValueError: The line is not one whole record.
+    """
+    document = json.loads(line)
+    names = [f.name for f in fields(EpisodeResult)]
+    if not isinstance(document, dict) or sorted(document) != sorted(names):
+        raise ValueError(f"expected an object with the fields {', '.join(names)}")
+    return EpisodeResult(**document)
+
+
+def read_results(path: Path) -> tuple[list[EpisodeResult], int]:
+    """The whole records of a `results.jsonl`, and the length [bytes] of the part that holds them.
+
+    A last line that a killed process left unfinished is not part of either.
+
+    Raises:
+      InputError: A line other than the last is not a record, or an episode occurs twice.
+    """
+    if not path.exists():
+        return [], 0
+    results: list[EpisodeResult] = []
+    seen: set[tuple[str, int]] = set()
+    size = 0
+    lines = path.read_bytes().splitlines(keepends=True)
+    for number, raw in enumerate(lines, start=1):
+        try:
+            if not raw.endswith(b"\n"):
+                raise ValueError("the line has no end")
+            result = from_line(raw.decode("utf-8"))
+        except ValueError as error:
+            if number == len(lines):
+                break
+            raise InputError(f"{path}: line {number} is not an episode's result: {error}") from None
+        if result.key in seen:
+            task, episode = result.key
+            raise InputError(f"{path}: line {number} repeats episode {episode} of {task}")
+        seen.add(result.key)
+        results.append(result)
+        size += len(raw)
+    return results, size
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Replace the file's content in one step: a reader sees the old or the new, never a part."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    staging = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with staging.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        staging.replace(path)
+    finally:
+        staging.unlink(missing_ok=True)
+
+
+def write_sorted(path: Path, results: Iterable[EpisodeResult]) -> None:
+    """Rewrite a `results.jsonl` in the order of task and episode."""
+    ordered = sorted(results, key=lambda r: r.key)
+    write_atomically(path, "".join(map(to_line, ordered)).encode("utf-8"))
+
+
+def trajectory_path(out: Path, task: str, episode: int) -> Path:
+    """Where an evaluation in the folder `out` keeps an episode's trajectory."""
+    return out / "episodes" / task.replace("/", "__") / f"{episode:05d}.npz"
+
+
+def write_trajectory(path: Path, trajectory: Trajectory) -> None:
+    """Save a trajectory, compressed."""
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        times=np.asarray(trajectory.times, np.float64),
+        qpos=np.asarray(trajectory.qpos, np.float32),
+        annotations=np.asarray(trajectory.annotations, dtype=np.str_),
+    )
+    write_atomically(path, buffer.getvalue())
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Load what `write_trajectory` saved.
+
+    Raises:
+      InputError: The file is missing or is not a trajectory.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            data: dict[str, Any] = {k: arrays[k] for k in ("times", "qpos", "annotations")}
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a trajectory ({error})") from None
+    return Trajectory(data["times"], data["qpos"], data["annotations"].tolist())

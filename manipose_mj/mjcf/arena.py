@@ -1,0 +1,95 @@
+"""The table-top arena: physics options, table, floor, lights and the fixed cameras."""
+
+from __future__ import annotations
+
+import numpy as np
+from dm_control import composer, mjcf
+from jaxtyping import Float
+
+TABLE_HALF_EXTENTS = (0.65, 0.8, 0.02)
+TABLE_CENTER = (0.45, 0.0, -0.02)
+TABLE_HEIGHT = 0.75
+PHYSICS_TIMESTEP = 0.002
+
+# Seen by sensors: 0-2. Collision geometry: 3. Goal markers, which only pictures show: 4.
+COLLISION_GROUP = 3
+MARKER_GROUP = 4
+
+# Position and the point looked at, in the world frame [m]; vertical field of view [deg].
+FIXED_CAMERAS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
+    "overview": ((1.25, -1.05, 0.95), (0.38, 0.0, 0.18), 45.0),
+    "front": ((1.30, 0.0, 0.65), (0.40, 0.0, 0.10), 45.0),
+    "left": ((0.45, 0.95, 0.60), (0.45, 0.0, 0.10), 45.0),
+    "right": ((0.45, -0.95, 0.60), (0.45, 0.0, 0.10), 45.0),
+}
+
+
+class TableArena(composer.Arena):
+    """A table whose top is the plane z = 0; the robot's base stands at the world's origin."""
+
+    def _build(self, name: str = "world") -> None:
+        super()._build(name=name)
+        root = self._mjcf_root
+        _set_physics_options(root)
+        root.visual.headlight.set_attributes(ambient=[0.35] * 3, diffuse=[0.3] * 3, specular=[0.1] * 3)
+        root.visual.map.set_attributes(znear=0.01, zfar=50.0)
+        getattr(root.visual, "global").set_attributes(offwidth=1280, offheight=960)
+        world = root.worldbody
+        world.add(
+            "light", name="key", pos=[0.8, -0.9, 2.2], dir=[-0.2, 0.45, -1], diffuse=[0.55] * 3,
+            castshadow=True,
+        )  # fmt: skip
+        world.add("light", name="fill", pos=[-0.6, 1.2, 1.8], dir=[0.5, -0.6, -1], diffuse=[0.2] * 3, castshadow=False)  # fmt: skip
+        world.add(
+            "geom", name="floor", type="plane", size=[4, 4, 0.1], pos=[0, 0, -TABLE_HEIGHT],
+            rgba=[0.80, 0.80, 0.78, 1],
+        )  # fmt: skip
+        self._add_table()
+        for camera, (position, target, fovy) in FIXED_CAMERAS.items():
+            world.add(
+                "camera", name=camera, pos=position, xyaxes=look_at(position, target), fovy=fovy
+            )
+
+    def _add_table(self) -> None:
+        table = self._mjcf_root.worldbody.add("body", name="table")
+        table.add(
+            "geom", name="table", type="box", size=TABLE_HALF_EXTENTS, pos=TABLE_CENTER,
+            rgba=[0.72, 0.58, 0.43, 1], friction=[0.8, 0.005, 0.0001], condim=4,
+        )  # fmt: skip
+        thickness = 2 * TABLE_HALF_EXTENTS[2]
+        leg = (TABLE_HEIGHT - thickness) / 2
+        for i, (sx, sy) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
+            x = TABLE_CENTER[0] + sx * (TABLE_HALF_EXTENTS[0] - 0.06)
+            y = TABLE_CENTER[1] + sy * (TABLE_HALF_EXTENTS[1] - 0.06)
+            table.add(
+                "geom", name=f"leg_{i}", type="box", size=[0.03, 0.03, leg], pos=[x, y, -thickness - leg],
+                rgba=[0.45, 0.36, 0.28, 1],
+            )  # fmt: skip
+
+    @property
+    def table_geom(self) -> mjcf.Element:
+        """The table's top."""
+        return self._mjcf_root.find("geom", "table")
+
+
+def look_at(
+    position: tuple[float, float, float], target: tuple[float, float, float]
+) -> Float[np.ndarray, "6"]:
+    """MuJoCo's `xyaxes` of a camera at `position` that looks at `target` with the world's z up."""
+    backward = np.asarray(position, float) - np.asarray(target, float)
+    backward /= np.linalg.norm(backward)
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    return np.concatenate([right, np.cross(backward, right)])
+
+
+def _set_physics_options(root: mjcf.RootElement) -> None:
+    # An elliptic cone with impratio 10 and the no-slip solver keeps a held object from creeping.
+    root.option.set_attributes(
+        timestep=PHYSICS_TIMESTEP,
+        integrator="implicitfast",
+        cone="elliptic",
+        impratio=10,
+        noslip_iterations=10,
+    )
+    root.size.set_attributes(memory="64M")

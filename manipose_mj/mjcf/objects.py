@@ -1,0 +1,112 @@
+"""Composer entities of built assets: rigid objects and articulated ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from dm_control import composer, mjcf
+from jaxtyping import Float
+
+from asset_pipeline.assets import Asset
+from manipose_mj.errors import InputError
+from manipose_mj.poses import invert, pose_to_vector, vector_to_pose
+
+
+class RigidObject(composer.Entity):
+    """A rigid asset, to be attached with `arena.add_free_entity`."""
+
+    def _build(self, asset: Asset, name: str | None = None) -> None:
+        if asset.kind != "rigid":
+            raise InputError(f"{asset.folder}: is an {asset.kind} asset; expected a rigid one")
+        self.asset = asset
+        self._mjcf_root = mjcf.from_path(str(asset.model_path))
+        self._mjcf_root.model = name or asset.name
+        # The arena's attachment frame carries the free joint instead of the stand-alone model's.
+        for joint in self._mjcf_root.find_all("joint"):
+            joint.remove()
+        for joint in self._mjcf_root.worldbody.find_all("freejoint"):
+            joint.remove()
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        return self._mjcf_root
+
+    @property
+    def free_joint(self) -> mjcf.Element:
+        """The free joint of the frame that the object hangs on."""
+        return mjcf.get_frame_freejoint(self._mjcf_root)
+
+    def object_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
+        """`T_world_object`."""
+        return vector_to_pose(np.array(physics.bind(self.free_joint).qpos))
+
+    def label_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
+        """`T_world_label`."""
+        return self.object_pose(physics) @ self.asset.label.pose
+
+    def place(self, physics: mjcf.Physics, pose: Float[np.ndarray, "4 4"]) -> None:
+        """Put the object's frame at `T_world_object`, at rest."""
+        joint = physics.bind(self.free_joint)
+        joint.qpos = pose_to_vector(pose)
+        joint.qvel = 0.0
+
+    def speeds(self, physics: mjcf.Physics) -> tuple[float, float]:
+        """Linear speed of the frame's origin [m/s] and angular speed [rad/s]."""
+        velocity = np.array(physics.bind(self.free_joint).qvel)
+        return float(np.linalg.norm(velocity[:3])), float(np.linalg.norm(velocity[3:]))
+
+
+class ArticulatedObject(composer.Entity):
+    """An articulated asset, to be attached with `arena.attach` at a pose that does not change."""
+
+    def _build(self, asset: Asset, name: str | None = None) -> None:
+        if asset.kind != "articulated":
+            raise InputError(f"{asset.folder}: is a {asset.kind} asset; expected an articulated one")
+        self.asset = asset
+        self._mjcf_root = mjcf.from_path(str(asset.model_path))
+        self._mjcf_root.model = name or asset.name
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        return self._mjcf_root
+
+    def joint(self, part: str) -> mjcf.Element:
+        """The joint of a moving part."""
+        return self._mjcf_root.find("joint", self.asset.part(part).name)
+
+    def opening(self, physics: mjcf.Physics, part: str) -> float:
+        """The joint's position [m or rad]; the lower limit is shut."""
+        return float(np.asarray(physics.bind(self.joint(part)).qpos).item())
+
+    def base_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
+        """`T_world_object`."""
+        body = physics.bind(self._mjcf_root.worldbody.body[0])
+        return vector_to_pose(np.concatenate([body.xpos, body.xquat]))
+
+    def part_pose(self, physics: mjcf.Physics, part: str) -> Float[np.ndarray, "4 4"]:
+        """`T_world_part`; a part's frame is the object frame while its joint is at zero."""
+        body = physics.bind(self._mjcf_root.find("body", part))
+        return vector_to_pose(np.concatenate([body.xpos, body.xquat]))
+
+    def handle_pose(self, physics: mjcf.Physics, part: str) -> Float[np.ndarray, "4 4"]:
+        """`T_world_handle`, the label of the part's handle.
+
+        Raises:
+          InputError: The part has no handle.
+        """
+        handle = self.asset.part(part).handle
+        if handle is None:
+            raise InputError(f"{self.asset.folder}: part {part!r} has no handle label")
+        return self.part_pose(physics, part) @ handle.pose
+
+    def in_cavity_frame(
+        self, physics: mjcf.Physics, part: str, points_world: Float[np.ndarray, "n 3"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Points in the frame of the part's cavity: centred, axes of the object, [m]."""
+        cavity = self.asset.part(part).cavity
+        if cavity is None:
+            raise InputError(f"{self.asset.folder}: part {part!r} has no cavity to store anything in")
+        carrier = (
+            self.part_pose(physics, part) if cavity.moves_with_part else self.base_pose(physics)
+        )
+        inverse = invert(carrier)
+        return points_world @ inverse[:3, :3].T + inverse[:3, 3] - cavity.center
