@@ -20,7 +20,7 @@ from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotation
 
-MIN_PROBABILITY = 0.02
+MIN_PROBABILITY = 0.01
 # Facets of a curved side are nearer to each other than this; faces of a box are not.
 MERGE_ANGLE = np.deg2rad(12.0)
 MAX_TILT = np.deg2rad(5.0)
@@ -38,7 +38,7 @@ def stable_poses(
 
     Poses that differ by a turn about the vertical, by a symmetry of the label or by the facets of
     one curved side are one pose; the most probable of them stands for all and gets their sum. Those
-    under 2 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose statistics"
+    under 1 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose statistics"
     (IEEE T-RA 1999), computed by trimesh.
 
     Args:

@@ -1,4 +1,4 @@
-"""The error that a person's input can cause."""
+"""The errors that the command line reports in one line, without a traceback."""
 
 from __future__ import annotations
 
@@ -26,3 +26,10 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     if near:
         return InputError(f"unknown {kind} {name!r}; did you mean {', '.join(near)}?")
     return InputError(f"unknown {kind} {name!r}; known: {', '.join(names) or 'none'}")
+
+
+class WorkerDiedError(RuntimeError):
+    """A worker process ended without a result: killed for memory, or crashed in native code.
+
+    Nobody's input is wrong: the command line prints the message and exits with code 1.
+    """

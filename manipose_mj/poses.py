@@ -188,6 +188,16 @@ class SymmetryGroup:
         return cls(np.stack(members))
 
 
+    def sampled(self, turns: int = 16) -> Float[np.ndarray, "m 3 3"]:
+        """Members of the group as a list; a continuous axis is sampled at `turns` equal angles."""
+        if not self.axial:
+            return self.rotations
+        about_x = [
+            rotation_about(np.array([1.0, 0.0, 0.0]), 2 * np.pi * i / turns) for i in range(turns)
+        ]
+        return np.stack([member @ turn for member in self.rotations for turn in about_x])
+
+
 def pose_error(
     estimate: Float[Array, "*b 4 4"], truth: Float[Array, "*b 4 4"], symmetry: SymmetryGroup
 ) -> tuple[Float[Array, "*b"], Float[Array, "*b"]]:

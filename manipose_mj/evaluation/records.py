@@ -61,6 +61,12 @@ class EpisodeResult:
     max_penetration: float
     wall_s: float
 
+    def __post_init__(self) -> None:
+        if self.failure is not None and self.failure not in STAGES:
+            raise ValueError(f"failure is {self.failure!r}; expected one of {', '.join(STAGES)}")
+        if self.success_at_end != (self.failure is None):
+            raise ValueError("an episode has a failure exactly when it does not succeed at its end")
+
     @property
     def key(self) -> tuple[str, int]:
         """What names the episode within an evaluation."""
@@ -83,8 +89,12 @@ class Trajectory:
 
 
 def to_line(result: EpisodeResult) -> str:
-    """The result as one line of JSON, with its newline."""
-    return json.dumps(asdict(result), allow_nan=False) + "\n"
+    """The result as one line of JSON, with its newline; NumPy scalars become plain numbers.
+
+    Raises:
+      ValueError: A number is not finite.
+    """
+    return json.dumps(asdict(result), allow_nan=False, default=lambda v: v.item()) + "\n"
 
 
 def from_line(line: str) -> EpisodeResult:

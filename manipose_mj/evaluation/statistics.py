@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import platform
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from itertools import groupby
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -73,6 +76,18 @@ def versions() -> dict[str, str]:
             found[name] = "not installed"
     found["platform"] = platform.platform()
     return found
+
+
+def machine() -> str:
+    """The processor and the number of cores this process may use, for people."""
+    model = platform.processor() or platform.machine()
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                model = line.partition(":")[2].strip()
+                break
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{model}, {cores} cores"
 
 
 def _median(values: Iterable[float | None]) -> float | None:

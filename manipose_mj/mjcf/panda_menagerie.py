@@ -58,13 +58,14 @@ def require_menagerie_panda() -> Path:
 def visual_meshes(folder: Path) -> list[VisualMesh]:
     """The visual meshes that `folder`'s panda.xml draws, in its order."""
     root = ElementTree.parse(folder / "panda.xml").getroot()
-    assets = folder / root.find("compiler").get("meshdir", "")
+    compiler = root.find("compiler")
+    assets = folder if compiler is None else folder / compiler.get("meshdir", "")
     files = {}
     for mesh in root.findall("asset/mesh"):
-        file = assets / mesh.get("file")
+        file = assets / mesh.attrib["file"]
         files[mesh.get("name", file.stem)] = file
     return [
-        VisualMesh(body.get("name"), geom.get("material"), files[geom.get("mesh")])
+        VisualMesh(body.attrib["name"], geom.attrib["material"], files[geom.attrib["mesh"]])
         for body in root.iter("body")
         for geom in body.findall("geom")
         if geom.get("class") == "visual"

@@ -1,0 +1,39 @@
+"""What every generator of the catalogue returns, and the random numbers it draws from."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from asset_pipeline.assets import MovingPart
+from asset_pipeline.geometry import Body
+from asset_pipeline.labelling.label import PoseLabel
+
+Colour = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """One object of a category; z is up in its frame.
+
+    Attributes:
+      label: The pose label in the object frame.
+      bodies: One for a rigid object; the base and its moving parts for an articulated one.
+      parts: What `asset.json` says of the moving parts, in the order of `bodies[1:]`.
+    """
+
+    label: PoseLabel
+    bodies: tuple[Body, ...]
+    parts: tuple[MovingPart, ...] = ()
+
+
+def specimen_rng(category: str, index: int) -> np.random.Generator:
+    """The generator of instance `index`: the same on every machine and in every process."""
+    return np.random.default_rng([zlib.crc32(category.encode()), index])
+
+
+def pick(rng: np.random.Generator, choices: tuple) -> tuple:
+    """One of a few alternatives."""
+    return choices[int(rng.integers(len(choices)))]

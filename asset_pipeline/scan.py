@@ -1,0 +1,142 @@
+"""A scanned object as a source delivers it, and the checks that its mesh has to pass."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+from PIL import Image, UnidentifiedImageError
+
+from asset_pipeline.assets import Provenance
+from asset_pipeline.labelling.label import ObjectType
+from manipose_mj.errors import InputError
+
+# A tabletop object: what is larger or smaller is almost surely given in another unit [m].
+MAX_EXTENT = 3.0
+MIN_EXTENT = 0.003
+MAX_TEXTURE_PIXELS = 1024
+
+
+@dataclass(frozen=True)
+class ScanItem:
+    """One object that a source offers: its name and the archive or folder that holds it."""
+
+    name: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One scanned rigid object, in metres, in the frame its publisher chose, z up.
+
+    Attributes:
+      name: Of the asset to build.
+      category: What kind of thing it is, such as `"bottle"`.
+      object_type: Which labelling rule applies.
+      mesh: Surface in the mesh frame [m], with `uv` where it has a texture.
+      texture: The image that the `uv` refer to, or None.
+      up: `(3,)` unit vector in the mesh frame, up when the object stands upright.
+      mass: [kg], or None where it is not published.
+      provenance: Source, item, licence and hashes of the input files.
+      fill: `"solid"`: the mass fills what the mesh encloses; `"shell"`: it lies in the surface
+        (blow-moulded and hollow things whose inside the scanner could not see).
+      functional: `(3,)`, roughly from grip to functional end, in the mesh frame; tools only.
+    """
+
+    name: str
+    category: str
+    object_type: ObjectType
+    mesh: trimesh.Trimesh
+    texture: Path | None
+    up: Float[np.ndarray, "3"]
+    mass: float | None
+    provenance: Provenance
+    fill: Literal["solid", "shell"] = "solid"
+    functional: Float[np.ndarray, "3"] | None = None
+
+
+def load_scan_mesh(path: Path) -> trimesh.Trimesh:
+    """Read a mesh file, vertices untouched (no merging, so that seams keep their `uv`).
+
+    Raises:
+      InputError: The file is missing or unreadable, or its mesh cannot be an object on a table.
+    """
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; expected a mesh") from None
+    except Exception as error:  # each of trimesh's readers fails in its own way
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
+    assert isinstance(mesh, trimesh.Trimesh)
+    check_mesh(mesh, str(path))
+    return mesh
+
+
+def check_mesh(mesh: trimesh.Trimesh, where: str) -> None:
+    """Refuse a mesh that cannot be a tabletop object in metres.
+
+    Raises:
+      InputError: No faces, faces that name missing vertices, NaN or infinite vertices, no size, or
+        extents that betray another unit. `where` opens the message.
+    """
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise InputError(f"{where}: mesh has no faces; expected a triangle surface")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{where}: a face names vertex {faces.max()} of {len(vertices)}")
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        raise InputError(
+            f"{where}: {int(bad.sum())} of {len(vertices)} vertices are NaN or infinite "
+            f"(first: vertex {int(bad.argmax())}); expected finite coordinates in metres"
+        )
+    extents = np.ptp(vertices[np.unique(faces)], axis=0)
+    size = " x ".join(f"{e:.3g}" for e in extents)
+    if float(mesh.area) <= 0 or extents.max() <= 0:
+        raise InputError(f"{where}: mesh has zero size ({size}); expected an object in metres")
+    if extents.max() > MAX_EXTENT:
+        raise InputError(
+            f"{where}: mesh measures {size} m; a tabletop object is below {MAX_EXTENT:g} m: "
+            "is it in millimetres? expected metres"
+        )
+    if extents.max() < MIN_EXTENT:
+        raise InputError(
+            f"{where}: mesh measures {size} m, which is too small to handle; expected metres"
+        )
+
+
+def write_texture(source: Path, target: Path) -> Path:
+    """Copy an image as PNG, its longer side at most 1024 pixels.
+
+    Raises:
+      InputError: `source` is missing or no image.
+    """
+    try:
+        with Image.open(source) as image:
+            image = image.convert("RGB")
+            image.thumbnail((MAX_TEXTURE_PIXELS, MAX_TEXTURE_PIXELS))
+            image.save(target, format="PNG")
+    except FileNotFoundError:
+        raise InputError(f"{source}: no such file; expected the scan's texture") from None
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise InputError(f"{source}: cannot be read as an image ({error})") from None
+    return target
+
+
+def sha256(path: Path) -> str:
+    """The hash of a file's content, in hex.
+
+    Raises:
+      InputError: The file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None

@@ -1,0 +1,99 @@
+"""`manipose evaluate`: episodes of the baseline, their statistics and the report."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from manipose_mj.errors import InputError, unknown_name
+
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def evaluate(
+    tasks: Annotated[Positional[tuple[str, ...]], arg(metavar="TASK...")],
+    /,
+    *,
+    episodes: int = 50,
+    seed: int = 0,
+    pose: Literal["oracle"] = "oracle",
+    jobs: int = CORES,
+    out: Annotated[Path | None, arg(metavar="DIR")] = None,
+    resume: bool = False,
+    assets: Annotated[Path | None, arg(metavar="DIR")] = None,
+    object_name: Annotated[str | None, arg(name="object", metavar="NAME")] = None,
+) -> int:
+    """Run the baseline, and write results.jsonl, summary.json and report.html.
+
+    Args:
+      tasks: Tasks to run, as `manipose list` names them.
+      episodes: Episodes per task.
+      seed: Base seed; each episode derives its own from it.
+      pose: Where the baseline takes object poses from.
+      jobs: Episodes at the same time, one core each. Results do not depend on it.
+      out: Folder for the results; by default a new one under manipose_results.
+      resume: Go on with the results in --out after an interruption.
+      assets: Folder of built assets to take objects from instead of the built-in ones.
+      object_name: The one object to manipulate, by its asset's name.
+    """
+    one_thread_per_process()
+    from manipose_mj.evaluation.config import EvaluationConfig
+
+    if out is None:
+        if resume:
+            raise InputError("--resume needs --out: the folder whose evaluation goes on")
+        out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
+    config = EvaluationConfig(tasks, out, episodes, seed, pose, jobs, assets, object_name)
+    check_names(tasks, assets, object_name)
+    return run_and_report(config, resume=resume)
+
+
+def run_and_report(config, *, resume: bool) -> int:
+    """Evaluate with progress, write the report and print the table.
+
+    Args:
+      config: An `EvaluationConfig`.
+      resume: Keep the results that its folder holds.
+    """
+    from manipose_mj.cli import output
+    from manipose_mj.evaluation.report import write_report
+    from manipose_mj.evaluation.runner import evaluate as run
+    from manipose_mj.evaluation.statistics import summarize
+
+    with output.EpisodeProgress() as progress:
+        results = run(config, resume=resume, on_progress=progress)
+    with output.working_on("drawing the report"):
+        report = write_report(config.out)
+    console = output.standard_output()
+    console.print(output.summary_table(summarize(results)))
+    console.print(f"report: {report}", soft_wrap=True, highlight=False)
+    return 0
+
+
+def one_thread_per_process() -> None:
+    """Hold BLAS to one thread, as in the workers; no effect once NumPy is loaded.
+
+    Episodes get their speed from `--jobs`, and sums must not depend on the number of threads.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def check_names(tasks: tuple[str, ...], assets: Path | None, object_name: str | None) -> None:
+    """Find misspelt names before anything is written."""
+    from manipose_mj.suite import ALL_TASKS
+
+    known = ["/".join(task) for task in ALL_TASKS]
+    for task in tasks:
+        if task not in known:
+            raise unknown_name("task", task, known)
+    if assets is not None:
+        from asset_pipeline.assets import list_assets
+
+        names = [folder.name for folder in list_assets(assets)]
+        if object_name is not None and object_name not in names:
+            raise unknown_name(f"object in {assets}", object_name, names)

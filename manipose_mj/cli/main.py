@@ -1,0 +1,64 @@
+"""The `manipose` command."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+
+import tyro
+from tyro.extras import SubcommandApp
+
+from manipose_mj.cli import assets, demo, doctor, evaluate, render, tasks
+from manipose_mj.errors import InputError, WorkerDiedError
+
+DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
+EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 1, 2, 130, 141
+
+
+def build_app() -> SubcommandApp:
+    """Every subcommand; each loads what it needs only when it runs."""
+    app = SubcommandApp()
+    app.command(demo.demo)
+    app.command(evaluate.evaluate)
+    app.command(tasks.list_tasks, name="list")
+    app.command(render.render)
+    app.command(assets.build_app(), name="assets", help="Build, check and inspect object assets.")
+    app.command(doctor.doctor)
+    return app
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code.
+
+    0: done; 1: done, and something failed a check; 2: the input or its place on disk was wrong;
+    130: interrupted.
+    """
+    try:
+        config = (tyro.conf.FlagCreatePairsOff,)
+        return build_app().cli(prog="manipose", description=DESCRIPTION, args=argv, config=config) or 0
+    except InputError as error:
+        return _fail(str(error), EXIT_INPUT)
+    except WorkerDiedError as error:
+        return _fail(str(error), EXIT_FAILED)
+    except KeyboardInterrupt:
+        return _fail("interrupted; whole results are kept", EXIT_INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of a pipe has left: the interpreter must not complain about it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_PIPE
+    except OSError as error:
+        if error.errno is None or error.errno == errno.EBADF:
+            raise
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return _fail(f"{where}{error.strerror}", EXIT_INPUT)
+
+
+def _fail(message: str, code: int) -> int:
+    sys.stderr.write(f"manipose: {' '.join(message.split())}\n")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,125 @@
+"""Consoles, tables and progress on the terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from manipose_mj.evaluation.records import EpisodeResult
+
+PIPED_WIDTH = 140
+QUIET_S = 2.0
+REPORT_EVERY_S = 15.0
+
+
+def standard_output() -> Console:
+    """For results. As wide as the tables need where nobody's window limits it."""
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, soft_wrap=False)
+
+
+def standard_error() -> Console:
+    """For progress and notes."""
+    return Console(stderr=True)
+
+
+def write_json(document: Any) -> None:
+    """Plain JSON on standard output, for other programs."""
+    sys.stdout.write(json.dumps(document, indent=1) + "\n")
+
+
+@contextmanager
+def working_on(what: str) -> Iterator[None]:
+    """Show on standard error that something of unknown length is under way."""
+    console = standard_error()
+    if console.is_terminal:
+        with console.status(what):
+            yield
+        return
+    start = time.monotonic()
+    yield
+    if (took := time.monotonic() - start) > QUIET_S:
+        console.print(f"{what}: {took:.0f} s", highlight=False)
+
+
+class EpisodeProgress:
+    """Progress of an evaluation on standard error: a bar on a terminal, now and then a line elsewhere."""
+
+    def __init__(self) -> None:
+        self._console = standard_error()
+        self._bar: Any = None
+        self._start = time.monotonic()
+        self._last = self._start + QUIET_S - REPORT_EVERY_S  # the first line comes after QUIET_S
+
+    def __enter__(self) -> EpisodeProgress:
+        if self._console.is_terminal:
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
+
+            self._bar = Progress(
+                TextColumn("episodes"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.description}"),
+                TimeElapsedColumn(),
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                console=self._console,
+            )
+            self._bar.add_task("", total=None)
+            self._bar.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, done: Sequence[EpisodeResult], total: int) -> None:
+        """Say how far the evaluation is."""
+        succeeded = sum(r.success_at_end for r in done)
+        if self._bar is not None:
+            text = f"{succeeded} succeeded"
+            self._bar.update(self._bar.task_ids[0], completed=len(done), total=total, description=text)
+        elif done and time.monotonic() - self._last > REPORT_EVERY_S:
+            self._last = time.monotonic()
+            seconds = self._last - self._start
+            text = f"{len(done)}/{total} episodes, {succeeded} succeeded, {seconds:.0f} s"
+            self._console.print(text, highlight=False)
+
+
+def summary_table(summary: dict[str, dict[str, Any]]) -> Table:
+    """The tasks of a `summary.json`, one row each."""
+    table = Table("task", title_justify="left")
+    for name in ("episodes", "at end", "95 % interval", "once", "cm", "deg", "median s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("failures")
+    for task, row in summary.items():
+        low, high = row["wilson_95"]
+        table.add_row(
+            task,
+            str(row["episodes"]),
+            str(row["success_at_end"]),
+            f"{100 * low:.0f}-{100 * high:.0f} %",
+            str(row["success_once"]),
+            _scaled(row["median_translation_error_m"], 100, 2),
+            _scaled(row["median_rotation_error_rad"], 57.29578, 1),
+            f"{row['median_wall_s']:.1f}",
+            ", ".join(f"{stage} {n}" for stage, n in row["failures"].items()) or "none",
+        )
+    return table
+
+
+def _scaled(value: float | None, factor: float, digits: int) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}f}"

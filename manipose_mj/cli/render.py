@@ -1,0 +1,55 @@
+"""`manipose render`: a picture of a task at its start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from manipose_mj.errors import InputError
+
+
+def render(
+    task: Annotated[Positional[str], arg(metavar="TASK")],
+    /,
+    *,
+    out: Annotated[Path, arg(metavar="FILE.png")],
+    seed: int = 0,
+    camera: str = "overview",
+    height: int = 480,
+    width: int = 640,
+    assets: Annotated[Path | None, arg(metavar="DIR")] = None,
+    object_name: Annotated[str | None, arg(name="object", metavar="NAME")] = None,
+) -> None:
+    """Save a picture of a task at the start of an episode.
+
+    Args:
+      task: The task, as `manipose list` names it.
+      out: The picture's file; its ending chooses the format.
+      seed: Seed of the episode.
+      camera: Name of a camera of the scene.
+      height: Height in pixels.
+      width: Width in pixels.
+      assets: Folder of built assets to take objects from instead of the built-in ones.
+      object_name: The one object to show, by its asset's name.
+    """
+    from manipose_mj.cli.evaluate import check_names
+
+    if height < 1 or width < 1:
+        raise InputError(f"a picture of {width} x {height} pixels has nothing to show")
+    check_names((task,), assets, object_name)
+    from PIL import Image
+
+    if out.suffix.lower() not in Image.registered_extensions():
+        raise InputError(f"{out}: no picture format has this ending; try .png")
+    from manipose_mj.cli import output
+    from manipose_mj.control.episode import start_state
+    from manipose_mj.mjcf.pictures import render as draw
+
+    with output.working_on("drawing"):
+        model, data = start_state(task, seed=seed, assets=assets, object_name=object_name)
+        picture = draw(model, data, camera, height, width, engine="auto")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(picture).save(out)
+    output.standard_output().print(f"picture: {out}", soft_wrap=True, highlight=False)

@@ -1,0 +1,79 @@
+"""The baseline policy: perceive, plan symbolically, execute primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from dm_control import composer
+
+from manipose_mj.control.arm_model import ArmModel
+from manipose_mj.control.executor import Action, Executor
+from manipose_mj.control.failure import StageFailure
+from manipose_mj.control.motion_planner import MotionPlanner
+from manipose_mj.control.oracle import OracleSenses
+from manipose_mj.control.plan import Plan, Step
+from manipose_mj.control.planner import make_plan
+from manipose_mj.control.planning_scene import PlanningScene
+from manipose_mj.control.primitives import Primitives
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.base import ManipulationTask
+
+
+class Baseline:
+    """Plans and acts in one environment; build it once, run it for many episodes."""
+
+    def __init__(self, environment: composer.Environment) -> None:
+        """Compiles the planner's models.
+
+        Args:
+          environment: Of one of this package's tasks, after its first reset.
+        """
+        task = environment.task
+        assert isinstance(task, ManipulationTask)
+        self._task = task
+        self._physics = environment.physics
+        model = self._physics.model.ptr
+        robot = task.robot.mjcf_model.model
+        self._scene = PlanningScene(
+            model, model.body(f"{robot}/").id, model.body(f"{robot}/hand").id
+        )
+        self._arm = ArmModel(task.root_entity.mjcf_model, robot)
+        self._senses = OracleSenses(task, self._physics, self._scene)
+        self.status = ""
+
+    def actions(self, seed: int) -> Iterator[Action]:
+        """The actions of one episode, from the start state to the goal.
+
+        Args:
+          seed: Of the motion planner's samples.
+
+        Raises:
+          StageFailure: The baseline gives up; the stage says where.
+        """
+        timestep = self._task.control_timestep
+        planner = MotionPlanner(self._scene, self._arm, timestep, np.random.default_rng(seed))
+        executor = Executor(self._senses, timestep)
+        primitives = Primitives(executor, planner)
+        try:
+            plan = make_plan(self._task.goal, executor.perceive())
+        except InputError as error:
+            raise StageFailure("plan", str(error)) from None
+        for index, step in enumerate(plan):
+            self.status = str(step)
+            if step.primitive == "grasp_at":
+                yield from primitives.grasp_at(step.subject, _destination(plan, index))
+            elif step.primitive == "move_to":
+                yield from primitives.move_to(step)
+            else:
+                yield from primitives.release(step.subject)
+        self.status = "done"
+        yield from executor.wait(0.5)
+
+
+def _destination(plan: Plan, index: int) -> Step | None:
+    """Where the thing grasped at `index` goes next."""
+    following = plan[index + 1] if index + 1 < len(plan) else None
+    if following is not None and following.primitive == "move_to":
+        return following
+    return None

@@ -1,0 +1,18 @@
+"""Why an episode failed: the stage, and one line."""
+
+from __future__ import annotations
+
+STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics")
+
+
+class StageFailure(Exception):
+    """The baseline gave up.
+
+    Attributes: stage: one of `STAGES`; reason: one line.
+    """
+
+    def __init__(self, stage: str, reason: str) -> None:
+        assert stage in STAGES
+        super().__init__(f"{stage}: {reason}")
+        self.stage = stage
+        self.reason = reason

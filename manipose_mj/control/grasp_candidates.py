@@ -1,0 +1,90 @@
+"""Grasps in the world: an object's annotated ones, a handle's from its label; those in reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from manipose_mj.control.batch_ik import seeds_for, solve
+from manipose_mj.control.belief import ObjectBelief, PartBelief
+from manipose_mj.mjcf.panda import MAX_OPENING
+from manipose_mj.poses import compose, rotation_about
+
+# How much further than the object the gripper is open on approach, in all [m].
+OPENING_MARGIN = 0.012
+# Of the approach to a handle, about its long axis [rad], and along it [m].
+HANDLE_TILTS = (0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79)
+HANDLE_SLIDES = (0.0, 0.025, -0.025)
+_HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Grasps:
+    """Attributes: tcp_poses `(n, 4, 4)`, `T_world_tcp`, best first; widths `(n,)` [m]."""
+
+    tcp_poses: Float[np.ndarray, "n 4 4"]
+    widths: Float[np.ndarray, "n"]
+
+    def __len__(self) -> int:
+        return len(self.widths)
+
+    def take(self, index: Int[np.ndarray, "k"]) -> Grasps:
+        """These of them, in this order."""
+        return Grasps(self.tcp_poses[index], self.widths[index])
+
+    @property
+    def openings(self) -> Float[np.ndarray, "n"]:
+        """How far to open before the approach [m]."""
+        return np.minimum(self.widths + OPENING_MARGIN, MAX_OPENING)
+
+
+def object_grasps(thing: ObjectBelief) -> Grasps:
+    """The annotated grasps and their half turns about the approach, where the object is."""
+    own = thing.pose @ thing.grasps.poses
+    both = np.stack([own, own @ _HALF_TURN], axis=1).reshape(-1, 4, 4)
+    return Grasps(both, np.repeat(thing.grasps.widths, 2))
+
+
+def handle_grasps(part: PartBelief) -> Grasps:
+    """Grasps around the bar of a handle: the hand comes along -Y of its label, tilted about X."""
+    handle = part.handle_pose
+    width = float(min(part.handle.extents[1:]))
+    poses = []
+    for tilt in HANDLE_TILTS:
+        for slide in HANDLE_SLIDES:
+            for sign in (1.0, -1.0):
+                turn = rotation_about(np.array([1.0, 0.0, 0.0]), tilt)
+                approach = turn @ np.array([0.0, -1.0, 0.0])
+                x = np.array([sign, 0.0, 0.0])
+                rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
+                poses.append(handle @ compose(rotation, np.array([slide, 0.0, 0.0])))
+    return Grasps(np.stack(poses), np.full(len(poses), width))
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Which poses the arm can take: index `(k,)` into them, with joints `(k, 7)` [rad]."""
+
+    index: Int[np.ndarray, "k"]
+    joints: Float[np.ndarray, "k 7"]
+
+
+def reachable(
+    tcp_poses: Float[np.ndarray, "n 4 4"],
+    near: Float[np.ndarray, "7"],
+    *,
+    extra_seeds: Float[np.ndarray, "n 7"] | None = None,
+) -> Reach:
+    """Of each reachable pose the solution nearest to the configuration `near`."""
+    if not len(tcp_poses):
+        return Reach(np.empty(0, int), np.empty((0, 7)))
+    seeds = seeds_for(tcp_poses)
+    if extra_seeds is not None:
+        seeds = np.concatenate([seeds, extra_seeds[None]])
+    joints, solved = solve(tcp_poses, seeds)
+    distance = np.where(solved, np.abs(joints - near).sum(axis=-1), np.inf)
+    best = distance.argmin(axis=0)
+    index = np.flatnonzero(np.isfinite(distance.min(axis=0)))
+    return Reach(index, joints[best[index], index])

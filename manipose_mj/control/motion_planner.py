@@ -1,0 +1,205 @@
+"""Motions of one arm in one scene: free paths, straight lines, setting down, moving a part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.control.arm_model import ArmModel
+from manipose_mj.control.belief import ObjectBelief, PartBelief
+from manipose_mj.control.free_motion import plan_path
+from manipose_mj.control.grasp_candidates import reachable
+from manipose_mj.control.line_motion import LineConfig, line_poses, track
+from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, Clearance, PlanningScene
+from manipose_mj.control.trajectory import Timing, timed
+from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about
+
+# Heights from which an object is lowered to its place, best first [m].
+_DESCENTS = (0.10, 0.06, 0.03)
+_MAX_PLACES = 8
+# Of every so many control steps one is checked for collision.
+_CHECK_EVERY = 4
+
+
+@dataclass(frozen=True)
+class Place:
+    """How to set an object down: `above` `(7,)`, where the descent starts, and the descent `(t, 7)`."""
+
+    above: Float[np.ndarray, "7"]
+    descent: Float[np.ndarray, "t 7"]
+
+
+class MotionPlanner:
+    """Plans on the planning scene and on the arm model, both of which follow the belief."""
+
+    def __init__(
+        self, scene: PlanningScene, arm: ArmModel, timestep: float, rng: np.random.Generator
+    ) -> None:
+        self.scene = scene
+        self._arm = arm
+        self._timestep = timestep
+        self._rng = rng
+        self._timing = Timing()
+        self._line = LineConfig()
+
+    def tcp_pose(self, joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
+        """`T_world_tcp`."""
+        return self.scene.tcp_pose(joints)
+
+    def backed_off(
+        self, joints: Float[np.ndarray, "7"], distance: float
+    ) -> Float[np.ndarray, "4 4"]:
+        """The TCP's pose after going back along its approach [m]."""
+        pose = self.tcp_pose(joints)
+        pose[:3, 3] -= distance * pose[:3, 2]
+        return pose
+
+    def body_name(self, body: int) -> str:
+        """The name of a body of the scene."""
+        return self.scene.model.body(body).name
+
+    def free_joint(self, thing: ObjectBelief) -> int:
+        """The free joint that an object's body hangs on."""
+        return int(self.scene.model.body_jntadr[thing.body])
+
+    def collides(
+        self,
+        joints: Float[np.ndarray, "7"],
+        *,
+        clearance: Clearance,
+        target: Bool[np.ndarray, "ngeom"] | None = None,
+        carried: Carried | None = None,
+    ) -> bool:
+        """Whether the arm, with what it carries, is too close to anything."""
+        with self.scene.query(clearance=clearance, target=target, carried=carried) as scene:
+            return scene.in_collision(joints)
+
+    def free_path(
+        self,
+        start: Float[np.ndarray, "7"],
+        goal: Float[np.ndarray, "7"],
+        *,
+        carried: Carried | None = None,
+    ) -> Float[np.ndarray, "t 7"] | None:
+        """Joint targets from rest to rest through free space; None if no path was found."""
+        with self.scene.query(clearance=TRANSIT, carried=carried) as scene:
+            path = plan_path(start, goal, scene.in_collision, self._rng)
+        return None if path is None else timed(path, self._timestep, self._timing)
+
+    def line(
+        self,
+        joints: Float[np.ndarray, "7"],
+        goal: Float[np.ndarray, "4 4"],
+        *,
+        clearance: Clearance,
+        target: Bool[np.ndarray, "ngeom"] | None = None,
+        carried: Carried | None = None,
+        touched: frozenset[str] = frozenset(),
+    ) -> Float[np.ndarray, "t 7"] | None:
+        """Joint targets along a straight line of the TCP to `goal`; None if it is not free."""
+        start = self.tcp_pose(joints)
+        self._arm.follow(self.scene)
+        poses = line_poses(start, goal, self._timestep, self._line)
+        targets = track(
+            self._arm, joints, poses, self._timestep, touched_bodies=touched, config=self._line
+        )
+        if targets is None:
+            return None
+        with self.scene.query(clearance=clearance, target=target, carried=carried) as scene:
+            checked = [*targets[_CHECK_EVERY::_CHECK_EVERY], targets[-1]]
+            if any(scene.in_collision(q) for q in checked):
+                return None
+        return targets
+
+    def place(
+        self,
+        pose_tcp: Float[np.ndarray, "4 4"],
+        label_poses: tuple[Float[np.ndarray, "4 4"], ...],
+        symmetry: SymmetryGroup,
+        carried: Carried,
+        near: Float[np.ndarray, "7"],
+    ) -> Place | None:
+        """A way to lower what is held to one of `label_poses`, nearest to the configuration `near`.
+
+        Args:
+          pose_tcp: `T_tcp_label` of what is held.
+          label_poses: `T_world_label`, any of them will do.
+          symmetry: Turns that change nothing.
+          carried: What is held, for collision checks.
+          near: Preferred configuration there [rad].
+        """
+        tcp_poses = equivalent_poses(label_poses, symmetry) @ invert(pose_tcp)
+        extra = np.broadcast_to(near, (len(tcp_poses), 7))
+        reach = reachable(tcp_poses, near, extra_seeds=extra)
+        order = np.argsort(np.abs(reach.joints - near).sum(axis=1), kind="stable")
+        for k in order[:_MAX_PLACES]:
+            place = self._lowered(reach.joints[k], carried)
+            if place is not None:
+                return place
+        return None
+
+    def _lowered(self, joints: Float[np.ndarray, "7"], carried: Carried) -> Place | None:
+        if self.collides(joints, clearance=CONTACT, carried=carried):
+            return None
+        for height in _DESCENTS:
+            above = self.tcp_pose(joints)
+            above[2, 3] += height
+            ascent = self.line(joints, above, clearance=CONTACT, carried=carried)
+            if ascent is not None and not self.collides(
+                ascent[-1], clearance=TRANSIT, carried=carried
+            ):
+                return Place(ascent[-1], np.concatenate([ascent[::-1], joints[None]]))
+        return None
+
+    def part_path(
+        self, joints: Float[np.ndarray, "7"], part: PartBelief, opening: float
+    ) -> Float[np.ndarray, "t 7"] | None:
+        """Joint targets that carry a held handle to another opening; None if the arm cannot."""
+        start = self.tcp_pose(joints)
+        handle_tcp = invert(part.handle_pose) @ start
+        travel = abs(opening - part.opening)
+        radius = 1.0
+        if part.joint.kind == "hinge":
+            lever = part.handle.origin - part.joint.origin
+            radius = float(np.linalg.norm(np.cross(part.joint.axis, lever)))
+        ends = np.eye(4), np.eye(4)
+        ends[1][0, 3] = travel * radius
+        share = line_poses(*ends, self._timestep, self._line)[:, 0, 3] / max(travel * radius, 1e-9)
+        openings = part.opening + share * (opening - part.opening)
+        poses = np.stack(
+            [part.base_pose @ joint_motion(part, q) @ part.handle.pose @ handle_tcp for q in openings]
+        )
+        self._arm.follow(self.scene)
+        touched = frozenset({self.body_name(part.body)})
+        targets = track(
+            self._arm, joints, poses, self._timestep, touched_bodies=touched, config=self._line
+        )
+        if targets is None:
+            return None
+        address = int(self.scene.model.jnt_qposadr[self.scene.model.body_jntadr[part.body]])
+        with self.scene.query(clearance=CONTACT, target=part.geoms) as scene:
+            for q, value in list(zip(targets, openings, strict=False))[::_CHECK_EVERY]:
+                scene.data.qpos[address] = value
+                if scene.in_collision(q):
+                    return None
+        return targets
+
+
+def joint_motion(part: PartBelief, position: float) -> Float[np.ndarray, "4 4"]:
+    """How the part has moved, in the object frame, when its joint is at `position`."""
+    joint = part.joint
+    if joint.kind == "slide":
+        return compose(np.eye(3), joint.axis * position)
+    rotation = rotation_about(joint.axis, position)
+    return compose(rotation, joint.origin - rotation @ joint.origin)
+
+
+def equivalent_poses(
+    label_poses: tuple[Float[np.ndarray, "4 4"], ...], symmetry: SymmetryGroup
+) -> Float[np.ndarray, "m 4 4"]:
+    """Every label pose combined with every sampled member of the symmetry group."""
+    turns = symmetry.sampled()
+    turned = compose(turns, np.zeros((len(turns), 3)))
+    return np.concatenate([pose @ turned for pose in label_poses])

@@ -1,0 +1,91 @@
+"""A symbolic planner: from a goal and a belief to a plan of primitives."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
+from manipose_mj.control.plan import Plan, Step
+from manipose_mj.errors import InputError
+from manipose_mj.poses import compose, rotation_about
+from manipose_mj.tasks.goals import Goal, PoseGoal
+from manipose_mj.tasks.success import box_corners
+
+# How far to open, of the joint's range: all the way would ram the stop.
+OPEN_SHARE = 0.95
+OPEN_ENOUGH = 0.85
+# The object is let go this high above the surface it shall rest on [m].
+DROP_HEIGHT = 0.002
+CAVITY_MARGIN = 0.004
+
+
+def make_plan(goal: Goal, belief: Belief) -> Plan:
+    """Steps that reach the goal from what is believed.
+
+    Raises:
+      InputError: The goal names something that is not there, or the object fits the cavity in no
+        orientation.
+    """
+    if isinstance(goal, PoseGoal):
+        return _place(goal.object, (goal.pose,))
+    part = belief.parts[goal.part]
+    low, high = part.joint.range
+    opened = low + OPEN_SHARE * (high - low)
+    poses = poses_in_cavity(belief.objects[goal.object], part, opened)
+    if not poses:
+        raise InputError(f"{goal.object} fits the cavity of {goal.part} in no orientation")
+    plan: Plan = ()
+    if part.opening < low + OPEN_ENOUGH * (high - low):
+        plan += _move_part(goal.part, opened)
+    return plan + _place(goal.object, poses) + _move_part(goal.part, low)
+
+
+def _place(name: str, poses: tuple[Float[np.ndarray, "4 4"], ...]) -> Plan:
+    return (Step("grasp_at", name), Step("move_to", name, poses=poses), Step("release", name))
+
+
+def _move_part(name: str, opening: float) -> Plan:
+    return (Step("grasp_at", name), Step("move_to", name, opening=opening), Step("release", name))
+
+
+def poses_in_cavity(
+    thing: ObjectBelief, part: PartBelief, opening: float
+) -> tuple[Float[np.ndarray, "4 4"], ...]:
+    """Label poses in which the object's bounding box rests on the cavity's floor and fits it.
+
+    Args:
+      thing: What to store; only its extents matter.
+      part: The drawer or door.
+      opening: Joint position while the object is put in [m or rad].
+
+    Returns:
+      `T_world_label`, lying ones first: what lies low is easiest to shut away.
+    """
+    cavity = part.cavity
+    if cavity is None:
+        return ()
+    carrier = part.base_pose
+    if cavity.moves_with_part and part.joint.kind == "slide":
+        carrier = part.base_pose @ compose(np.eye(3), part.joint.axis * opening)
+    corners = box_corners(thing.label.extents)
+    found = []
+    for rotation in _axis_aligned_rotations():
+        reach = np.abs(corners @ rotation.T).max(axis=0)
+        if (2 * reach > cavity.extents - CAVITY_MARGIN).any():
+            continue
+        floor = -cavity.extents[2] / 2 + reach[2] + DROP_HEIGHT
+        center = cavity.center + np.array([0.0, 0.0, floor])
+        found.append((reach[2], carrier @ compose(rotation, center)))
+    found.sort(key=lambda entry: round(entry[0], 4))
+    return tuple(pose for _, pose in found)
+
+
+def _axis_aligned_rotations() -> list[Float[np.ndarray, "3 3"]]:
+    """The 24 rotations of a cube."""
+    quarter = [
+        [rotation_about(np.eye(3)[axis], k * np.pi / 2) for k in range(4)] for axis in (0, 2)
+    ]
+    tilts = [rotation_about(np.eye(3)[1], k * np.pi / 2) for k in (1, 3)]
+    first = [x for x in quarter[0]] + tilts
+    return [np.round(z @ x) for x in first for z in quarter[1]]

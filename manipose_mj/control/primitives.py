@@ -1,0 +1,175 @@
+"""The three primitives: `grasp_at`, `move_to`, `release`. Everything is held by friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.belief import Belief, PartBelief
+from manipose_mj.control.executor import Actions, Executor
+from manipose_mj.control.failure import StageFailure
+from manipose_mj.control.grasp_candidates import OPENING_MARGIN
+from manipose_mj.control.motion_planner import MotionPlanner
+from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
+from manipose_mj.control.plan import Step
+from manipose_mj.control.planning_scene import CONTACT, carried_free_body
+from manipose_mj.mjcf.panda import MAX_OPENING
+from manipose_mj.poses import invert, rotation_angle
+
+# Past this the thing in the hand is not where the grasp put it.
+_LOST_DISTANCE = 0.04
+_LOST_ANGLE = 0.6
+# Of a part's joint from where it should have gone, as a share of its range.
+_OPENING_TOLERANCE = 0.12
+_LIFTS = (0.10, 0.06, 0.03)
+_RETREATS = (0.12, 0.09, 0.06)
+_SETTLE = 0.25  # after letting go [s]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Attributes: pick: how it was taken; pose_tcp: `T_tcp_label` then (of a handle, for a part)."""
+
+    pick: ObjectPick | PartPick
+    pose_tcp: Float[np.ndarray, "4 4"]
+
+
+class Primitives:
+    """Executes plan steps; each is a generator of actions and plans from a fresh belief.
+
+    Raises `StageFailure` where a step cannot be done.
+    """
+
+    def __init__(self, executor: Executor, planner: MotionPlanner) -> None:
+        self._executor = executor
+        self._planner = planner
+        self._held: _Held | None = None
+
+    def grasp_at(self, name: str, destination: Step | None) -> Actions:
+        """Take hold of an object, or of a part's handle, in a way that allows the next `move_to`."""
+        belief = self._executor.perceive()
+        if name in belief.parts:
+            opening = None if destination is None else destination.opening
+            pick = pick_part(self._planner, belief, belief.parts[name], opening)
+        else:
+            poses = () if destination is None else destination.poses
+            pick = pick_object(self._planner, belief, belief.objects[name], poses)
+        yield from self._executor.open_to(pick.opening)
+        yield from self._executor.follow(pick.free_path)
+        yield from self._executor.follow(pick.approach)
+        yield from self._executor.close()
+        belief = self._executor.perceive()
+        if belief.opening < min(0.5 * pick.width, pick.width - 0.004):
+            raise StageFailure("grasp", f"the gripper closed past {name}")
+        self._held = _Held(pick, self._pose_in_hand(belief, name))
+
+    def move_to(self, step: Step) -> Actions:
+        """Bring what is held to its destination."""
+        if self._held is None:
+            raise StageFailure("plan", f"move_to {step.subject} while nothing is held")
+        if isinstance(self._held.pick, PartPick):
+            yield from self._move_part(step, self._held.pick)
+        else:
+            yield from self._move_object(step, self._held.pick)
+
+    def release(self, name: str) -> Actions:
+        """Let go and back off along the approach."""
+        belief = self._executor.perceive()
+        held, self._held = self._held, None
+        if held is None:
+            raise StageFailure("plan", f"release {name} while nothing is held")
+        opening = min(belief.opening + OPENING_MARGIN, MAX_OPENING)
+        yield from self._executor.open_to(opening)
+        yield from self._executor.wait(_SETTLE)
+        belief = self._executor.perceive()
+        yield from self._executor.follow(self._retreat(belief, name))
+
+    def _retreat(self, belief: Belief, name: str) -> Float[np.ndarray, "t 7"]:
+        thing = belief.parts.get(name) or belief.objects[name]
+        clearance = replace(CONTACT, arm=0.0)
+        for distance in _RETREATS:
+            line = self._planner.line(
+                belief.joints,
+                self._planner.backed_off(belief.joints, distance),
+                clearance=clearance,
+                target=thing.geoms,
+                touched=frozenset({self._planner.body_name(thing.body)}),
+            )
+            if line is not None:
+                return line
+        raise StageFailure("release", f"no way to back off from {name}")
+
+    def _move_object(self, step: Step, pick: ObjectPick) -> Actions:
+        belief = self._executor.perceive()
+        thing = belief.objects[step.subject]
+        pose_tcp = self._check_held(belief, step.subject)
+        tcp = self._planner.tcp_pose(belief.joints)
+        carried = carried_free_body(
+            self._planner.scene.model, thing.body, self._planner.free_joint(thing), invert(tcp) @ thing.pose
+        )
+        place = self._planner.place(pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal)
+        if place is None:
+            raise StageFailure("plan", f"no way to set {step.subject} down where it should go")
+        lift = None
+        for height in _LIFTS:
+            lift = self._planner.line(
+                belief.joints, _raised(tcp, height), clearance=CONTACT, carried=carried
+            )
+            if lift is not None:
+                break
+        if lift is None:
+            raise StageFailure("plan", f"no way to lift {step.subject}")
+        free = self._planner.free_path(lift[-1], place.above, carried=carried)
+        if free is None:
+            raise StageFailure("plan", f"no path for {step.subject} to where it should go")
+        yield from self._executor.follow(lift)
+        self._check_held(self._executor.perceive(), step.subject)
+        yield from self._executor.follow(free)
+        self._check_held(self._executor.perceive(), step.subject)
+        yield from self._executor.follow(place.descent)
+
+    def _move_part(self, step: Step, pick: PartPick) -> Actions:
+        assert step.opening is not None
+        belief = self._executor.perceive()
+        part = belief.parts[step.subject]
+        self._check_held(belief, step.subject)
+        path = self._planner.part_path(belief.joints, part, step.opening)
+        if path is None:
+            raise StageFailure("plan", f"the arm cannot carry {step.subject} all the way")
+        yield from self._executor.follow(path)
+        moved = self._executor.perceive().parts[step.subject]
+        low, high = moved.joint.range
+        if abs(moved.opening - step.opening) > _OPENING_TOLERANCE * (high - low):
+            raise StageFailure(
+                "motion",
+                f"{step.subject} is at {moved.opening:.3f}, should be at {step.opening:.3f}",
+            )
+
+    def _pose_in_hand(self, belief: Belief, name: str) -> Float[np.ndarray, "4 4"]:
+        part: PartBelief | None = belief.parts.get(name)
+        pose = belief.objects[name].label_pose if part is None else part.handle_pose
+        return invert(self._planner.tcp_pose(belief.joints)) @ pose
+
+    def _check_held(self, belief: Belief, name: str) -> Float[np.ndarray, "4 4"]:
+        """`T_tcp_label` now.
+
+        Raises:
+          StageFailure: It is no longer where the grasp had it.
+        """
+        assert self._held is not None
+        now, then = self._pose_in_hand(belief, name), self._held.pose_tcp
+        moved = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
+        turned = float(rotation_angle(now[:3, :3], then[:3, :3]))
+        # A handle may slide along its bar and turn about it; what counts there is the joint.
+        is_part = name in belief.parts
+        if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
+            raise StageFailure("grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand")
+        return now
+
+
+def _raised(pose: Float[np.ndarray, "4 4"], height: float) -> Float[np.ndarray, "4 4"]:
+    raised = pose.copy()
+    raised[2, 3] += height
+    return raised

@@ -1,0 +1,272 @@
+"""Run the episodes of an evaluation, keep each result as it comes, and go on after a kill."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+from manipose_mj.errors import InputError, WorkerDiedError
+from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
+from manipose_mj.evaluation.records import (
+    EpisodeResult,
+    Trajectory,
+    read_results,
+    to_line,
+    trajectory_path,
+    write_atomically,
+    write_sorted,
+    write_trajectory,
+)
+from manipose_mj.evaluation.statistics import machine, summarize, versions
+
+RESULTS_FILE = "results.jsonl"
+SUMMARY_FILE = "summary.json"
+RUN_FILE = "run.json"
+
+logger = logging.getLogger(__name__)
+
+
+class Runner(Protocol):
+    """What runs one episode; must survive pickling by `cloudpickle`."""
+
+    def __call__(
+        self,
+        task: str,
+        *,
+        episode: int,
+        seed: int,
+        pose: str,
+        assets: Path | None,
+        object_name: str | None,
+    ) -> tuple[EpisodeResult, Trajectory]: ...
+
+
+def simulate(task: str, **options: Any) -> tuple[EpisodeResult, Trajectory]:
+    """The runner of every real evaluation: the baseline policy in MuJoCo."""
+    from manipose_mj.control.episode import run_episode  # loads the simulator: workers only
+
+    return run_episode(task, **options)
+
+
+def _ignore(done: Sequence[EpisodeResult], total: int) -> None: ...
+
+
+def evaluate(
+    config: EvaluationConfig,
+    *,
+    resume: bool = False,
+    runner: Runner = simulate,
+    on_progress: Callable[[Sequence[EpisodeResult], int], None] = _ignore,
+) -> list[EpisodeResult]:
+    """Run every episode that the output folder lacks, and write results and summary there.
+
+    `results.jsonl` gains a line as each episode ends, on disk before the next one is waited for; when all have
+    ended it is sorted, so that it is the same for any number of jobs, times apart.
+
+    Args:
+      config: What to run.
+      resume: Keep the results that `config.out` holds and run only what is missing.
+      runner: Runs one episode.
+      on_progress: Called with the results so far and the number wanted, first before any runs.
+
+    Returns:
+      The results in the order of task and episode.
+
+    Raises:
+      InputError: The folder cannot be written or holds results of something else, or an episode's
+        input is wrong.
+      WorkerDiedError: A worker process was killed; what had ended is kept.
+    """
+    identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
+    del identity["platform version"]  # a new kernel changes no result
+    with _results_file(config.out) as file:
+        results = _kept_results(config, identity, file, resume)
+        if not results:
+            run = {**identity, "jobs": config.jobs, "command": config.command, "machine": machine()}
+            write_atomically(config.out / RUN_FILE, _json(run))
+        done = {r.key for r in results}
+        missing = [
+            (task, episode)
+            for task in sorted(config.tasks)
+            for episode in range(config.episodes)
+            if (task, episode) not in done
+        ]
+        total = len(config.tasks) * config.episodes
+        on_progress(results, total)
+        for result in _outcomes(config, runner, missing):
+            _append(file, result)
+            results.append(result)
+            on_progress(results, total)
+        write_sorted(config.out / RESULTS_FILE, results)
+        write_atomically(config.out / SUMMARY_FILE, _json(_summary(config, results)))
+    return sorted(results, key=lambda r: r.key)
+
+
+@contextmanager
+def _results_file(out: Path) -> Iterator[IO[bytes]]:
+    """The open and locked results file; a disk that refuses becomes an `InputError`."""
+    path = out / RESULTS_FILE
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with path.open("ab") as file:
+            _lock(file, out)
+            yield file
+    except OSError as error:
+        if error.filename is not None and not str(error.filename).startswith(str(out)):
+            raise
+        raise InputError(
+            f"{out}: cannot write results there ({error.strerror or error}); "
+            "whole results are safe: make room or choose another --out, and --resume goes on"
+        ) from None
+
+
+def _lock(file: IO[bytes], out: Path) -> None:
+    """Keep a second evaluation out of the folder; the lock goes with the process, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{out}: another evaluation is writing there; wait for it") from None
+
+
+def _kept_results(
+    config: EvaluationConfig, identity: dict[str, Any], file: IO[bytes], resume: bool
+) -> list[EpisodeResult]:
+    """The results to keep, with an unfinished last line cut off the file.
+
+    Raises:
+      InputError: There are results and `resume` is False, or they belong to another configuration.
+    """
+    results, size = read_results(config.out / RESULTS_FILE)
+    if results and not resume:
+        raise InputError(
+            f"{config.out}: holds {len(results)} results; add --resume or choose another --out"
+        )
+    if results:
+        try:
+            before = json.loads((config.out / RUN_FILE).read_text(encoding="utf-8"))
+        except (FileNotFoundError, ValueError):
+            raise InputError(
+                f"{config.out / RUN_FILE}: missing or unreadable, so that its results cannot be "
+                "continued; choose another --out"
+            ) from None
+        for name, value in identity.items():
+            if before.get(name) != value:
+                raise InputError(
+                    f"{config.out}: its results have {name} {before.get(name)!r}, this run has "
+                    f"{value!r}; resume with the same configuration or choose another --out"
+                )
+    file.truncate(size)
+    return results
+
+
+def _append(file: IO[bytes], result: EpisodeResult) -> None:
+    file.write(to_line(result).encode("utf-8"))
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _outcomes(
+    config: EvaluationConfig, runner: Runner, episodes: list[tuple[str, int]]
+) -> Iterator[EpisodeResult]:
+    """Results as the episodes end, in any order."""
+    if config.jobs == 1 or len(episodes) <= 1:
+        for task, episode in episodes:
+            yield run_one(config, runner, task, episode)
+        return
+    import joblib
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    # One thread per worker: else every worker's BLAS takes all cores, and sums change their order.
+    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+        pool = joblib.Parallel(
+            n_jobs=min(config.jobs, len(episodes)),
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch="2*n_jobs",
+        )
+        outcomes = pool(joblib.delayed(run_one)(config, runner, *key) for key in episodes)
+    try:
+        yield from outcomes
+    except TerminatedWorkerError as error:
+        raise WorkerDiedError(
+            f"a worker process died ({' '.join(str(error).split())[:200]}); finished episodes are "
+            f"kept in {config.out}: repeat with --resume, and fewer --jobs if memory ran out"
+        ) from None
+
+
+def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -> EpisodeResult:
+    """Run an episode and save its trajectory; a crash of the simulation is a failed episode.
+
+    Raises:
+      InputError: The episode's input is wrong, or its trajectory cannot be written.
+    """
+    seed = episode_seed(config.seed, task, episode)
+    path = trajectory_path(config.out, task, episode)
+    start = time.perf_counter()
+    try:
+        result, trajectory = runner(
+            task,
+            episode=episode,
+            seed=seed,
+            pose=config.pose,
+            assets=config.assets,
+            object_name=config.object_name,
+        )
+        to_line(result)  # a number that is not finite shows here, where it costs one episode only
+    except (InputError, OSError, MemoryError):
+        raise
+    except Exception as error:  # one broken episode must not end the other hundred
+        logger.debug("episode %d of %s raised", episode, task, exc_info=True)
+        write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))
+        return _crashed(config, task, episode, seed, error, time.perf_counter() - start)
+    write_trajectory(path, trajectory)
+    return result
+
+
+def _crashed(
+    config: EvaluationConfig, task: str, episode: int, seed: int, error: Exception, wall_s: float
+) -> EpisodeResult:
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    return EpisodeResult(
+        task=task,
+        episode=episode,
+        seed=seed,
+        object=config.object_name or "",
+        pose_source=config.pose,
+        success_once=False,
+        success_at_end=False,
+        failure="physics",
+        reason=reason[:300],
+        translation_error=None,
+        rotation_error=None,
+        steps=0,
+        sim_time=0.0,
+        max_penetration=0.0,
+        wall_s=wall_s,
+    )
+
+
+def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
+    settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
+    return {
+        "tasks": summarize(results),
+        "versions": versions(),
+        "machine": machine(),
+        "command": config.command,
+        **settings,
+    }
+
+
+def _json(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode("utf-8")

@@ -1,0 +1,233 @@
+"""Many rays from one point against a model's visible geoms, without GL.
+
+`mujoco.mj_multiRay` alone is not exact: it skips a body by a sphere around its collision geoms
+(centre not rotated with the body) and a geom by the azimuth and elevation of its box's corners
+(edges can lie outside them), so near or visual-only geoms lose pixels that `mj_ray` hits. Here its
+culling is switched off and replaced by one that cannot lose a hit: rays are sorted into bundles,
+and a bundle is shown the geoms whose oriented boxes reach into its pyramid. That is also faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+VISIBLE_GROUPS = (0, 1, 2)  # what sensors see; group 3 holds the collision shapes
+PICTURE_GROUPS = (0, 1, 2, 4)  # group 4: markers that only pictures show
+_RAYS_PER_BUNDLE = 256
+_SHOWN, _HIDDEN = 0, 5  # geom groups, while rays are cast
+_FAR = 1e6  # half length that stands for an endless plane [m]
+
+
+@dataclass(frozen=True)
+class RayBundles:
+    """Rays `(x, y, 1)` from the origin of a frame that looks along its z, sorted by direction.
+
+    Attributes:
+      directions: `(n, 3)`, sorted so that a bundle's rays are neighbours; z is 1.
+      order: `(n,)`, `directions = given[order]`.
+      starts: `(k + 1,)`, bundle `i` is `directions[starts[i]:starts[i + 1]]`.
+      planes: `(k, 4, 3)`, inward normals of each bundle's pyramid.
+    """
+
+    directions: Float[np.ndarray, "n 3"]
+    order: Int[np.ndarray, "n"]
+    starts: Int[np.ndarray, "k1"]
+    planes: Float[np.ndarray, "k 4 3"]
+
+
+@dataclass(frozen=True)
+class RayHits:
+    """What rays met, in the order in which the rays were given.
+
+    Attributes:
+      scale: `(n,)`, hit point = origin + scale * direction; -1 where nothing was hit.
+      geom_id: `(n,)`, -1 where nothing was hit.
+      normal: `(n, 3)`, world frame, unit, towards the ray's origin; zero where nothing was hit.
+    """
+
+    scale: Float[np.ndarray, "n"]
+    geom_id: Int[np.ndarray, "n"]
+    normal: Float[np.ndarray, "n 3"]
+
+    def within(self, scale: float) -> RayHits:
+        """These hits, those beyond `scale` counted as nothing."""
+        beyond = self.scale > scale
+        return RayHits(
+            np.where(beyond, -1.0, self.scale),
+            np.where(beyond, np.int32(-1), self.geom_id),
+            np.where(beyond[:, None], 0.0, self.normal),
+        )
+
+
+def bundle_rays(xy: Float[np.ndarray, "n 2"]) -> RayBundles:
+    """Sort rays `(x, y, 1)` into bundles of similar direction.
+
+    Args:
+      xy: Slopes of the rays in their frame.
+    """
+    count = len(xy)
+    if count == 0:
+        return RayBundles(
+            np.empty((0, 3)), np.empty(0, np.int64), np.zeros(1, np.int64), np.empty((0, 4, 3))
+        )
+    # Strips of equal count along x, each cut into cells of equal count along y: small cells where
+    # rays are dense, which a regular grid does not give for light falling on a wide floor.
+    side = max(1, round(float(np.sqrt(count / _RAYS_PER_BUNDLE))))
+    strip = np.empty(count, np.int64)
+    strip[np.argsort(xy[:, 0], kind="stable")] = np.arange(count) * side // count
+    order = np.lexsort((xy[:, 1], strip))
+    cells = min(side * side, count)
+    starts = -(-np.arange(cells) * count // cells)
+    sorted_xy = xy[order]
+    x0, y0 = np.minimum.reduceat(sorted_xy, starts).T
+    x1, y1 = np.maximum.reduceat(sorted_xy, starts).T
+    one, zero = np.ones_like(x0), np.zeros_like(x0)
+    planes = np.stack(
+        [
+            np.stack([one, zero, -x0], axis=-1),
+            np.stack([-one, zero, x1], axis=-1),
+            np.stack([zero, one, -y0], axis=-1),
+            np.stack([zero, -one, y1], axis=-1),
+        ],
+        axis=1,
+    )
+    directions = np.concatenate([sorted_xy, np.ones((count, 1))], axis=1)
+    return RayBundles(directions, order, np.r_[starts, count], planes)
+
+
+def cast_rays(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    T_world_rays: Float[np.ndarray, "4 4"],
+    bundles: RayBundles,
+    *,
+    shown: np.ndarray | None = None,
+) -> RayHits:
+    """Cast every ray; equal to `mj_ray` of each (a test holds that).
+
+    While it runs, `model.geom_group` and `model.body_bvhadr` hold other values: another thread must
+    not step or render the same model meanwhile.
+
+    Args:
+      model: The compiled model.
+      data: Positions of its geoms: `mj_forward` or `mj_kinematics` has run.
+      T_world_rays: The frame of the rays.
+      bundles: From `bundle_rays`.
+      shown: `(ngeom,)` bool, the geoms that rays can meet; `visible_geoms(model)` if not given.
+    """
+    shown = visible_geoms(model) if shown is None else shown
+    rotation, origin = T_world_rays[:3, :3], np.ascontiguousarray(T_world_rays[:3, 3])
+    count = len(bundles.directions)
+    vectors = (bundles.directions @ rotation.T).ravel()
+    scale, geom_id = np.full(count, -1.0), np.full(count, -1, np.int32)
+    normal = np.zeros(3 * count)
+    reached = _reached(model, data, origin, bundles.planes @ rotation.T) & shown
+    groups = np.where(reached, _SHOWN, _HIDDEN).astype(np.int32)
+    busy = reached.any(axis=1)
+    mask = np.zeros(6, np.uint8)
+    mask[_SHOWN] = 1
+    with _own_culling(model) as geom_group:
+        for i in np.flatnonzero(busy).tolist():
+            geom_group[:] = groups[i]
+            a, b = int(bundles.starts[i]), int(bundles.starts[i + 1])
+            mujoco.mj_multiRay(
+                model,
+                data,
+                origin,
+                vectors[3 * a : 3 * b],
+                mask,
+                True,
+                -1,
+                geom_id[a:b],
+                scale[a:b],
+                normal[3 * a : 3 * b],
+                b - a,
+                mujoco.mjMAXVAL,
+            )
+    normals = normal.reshape(-1, 3)
+    # A surface seen from within has its normal turned to whoever looks at it.
+    away = np.einsum("ij,ij->i", normals, vectors.reshape(-1, 3)) > 0
+    normals[away] *= -1.0
+    hits = RayHits(np.empty_like(scale), np.empty_like(geom_id), np.empty_like(normals))
+    hits.scale[bundles.order] = scale
+    hits.geom_id[bundles.order] = geom_id
+    hits.normal[bundles.order] = normals
+    return hits
+
+
+def visible_geoms(model: mujoco.MjModel, groups: tuple[int, ...] = VISIBLE_GROUPS) -> np.ndarray:
+    """`(ngeom,)` bool: in one of the groups and not fully transparent."""
+    return np.isin(model.geom_group, groups) & (geom_colours(model)[:, 3] > 0)
+
+
+def geom_colours(model: mujoco.MjModel) -> Float[np.ndarray, "ngeom 4"]:
+    """Every geom's rgba by MuJoCo's rule: its own unless that is the default, else its material's."""
+    rgba = model.geom_rgba.copy()
+    untouched = (rgba == np.array([0.5, 0.5, 0.5, 1.0], np.float32)).all(axis=1)
+    from_material = untouched & (model.geom_matid >= 0)
+    rgba[from_material] = model.mat_rgba[model.geom_matid[from_material]]
+    return rgba
+
+
+def geom_boxes(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Centres and half lengths `(ngeom, 3)` [m] of the geoms' boxes in their own frames.
+
+    Primitives' are computed from `geom_size`, which may be edited after compilation;
+    `geom_aabb` is not updated then.
+    """
+    kind, size = model.geom_type, model.geom_size
+    centre, half = model.geom_aabb[:, :3].copy(), model.geom_aabb[:, 3:].copy()
+    geom = mujoco.mjtGeom
+    primitive = np.isin(
+        kind,
+        (geom.mjGEOM_SPHERE, geom.mjGEOM_CAPSULE, geom.mjGEOM_CYLINDER, geom.mjGEOM_ELLIPSOID)
+        + (geom.mjGEOM_BOX, geom.mjGEOM_PLANE),
+    )
+    centre[primitive] = 0.0
+    as_is = (kind == geom.mjGEOM_BOX) | (kind == geom.mjGEOM_ELLIPSOID)
+    half[as_is] = size[as_is]
+    sphere = kind == geom.mjGEOM_SPHERE
+    half[sphere] = size[sphere, :1]
+    capsule, cylinder = kind == geom.mjGEOM_CAPSULE, kind == geom.mjGEOM_CYLINDER
+    half[cylinder] = size[cylinder][:, [0, 0, 1]]
+    half[capsule] = size[capsule][:, [0, 0, 1]] + size[capsule, :1] * np.array([0.0, 0.0, 1.0])
+    half[kind == geom.mjGEOM_PLANE] = (_FAR, _FAR, 0.0)
+    return centre, half
+
+
+def _reached(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    origin: Float[np.ndarray, "3"],
+    planes: Float[np.ndarray, "k 4 3"],
+) -> np.ndarray:
+    """`(k, ngeom)` bool: whether the geom's box is not wholly behind one of the bundle's planes."""
+    if not len(planes):
+        return np.zeros((0, model.ngeom), bool)
+    centre, half = geom_boxes(model)
+    xmat = data.geom_xmat.reshape(-1, 3, 3)
+    centre = data.geom_xpos + np.einsum("gij,gj->gi", xmat, centre) - origin
+    normals = planes.reshape(-1, 3)
+    reach = normals @ centre.T
+    for axis in range(3):
+        reach += np.abs(normals @ (xmat[:, :, axis] * half[:, axis, None]).T)
+    return (reach >= -1e-9 * (1 + np.abs(reach))).reshape(len(planes), 4, -1).all(axis=1)
+
+
+@contextmanager
+def _own_culling(model: mujoco.MjModel) -> Iterator[np.ndarray]:
+    """Let `mj_multiRay` test every geom of a group; yields the groups to write to."""
+    groups, volumes = model.geom_group, model.body_bvhadr
+    kept_groups, kept_volumes = groups.copy(), volumes.copy()
+    try:
+        volumes[:] = -1  # a body without bounding volumes is not culled
+        yield groups
+    finally:
+        groups[:] = kept_groups
+        volumes[:] = kept_volumes

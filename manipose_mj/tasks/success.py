@@ -1,0 +1,102 @@
+"""What counts as success, written once as functions of arrays (NumPy or JAX).
+
+Definitions: a pose goal is met when the symmetric pose error is within tolerance, the object is at
+rest and the gripper has let go; an object is stored when its whole bounding box lies in the cavity
+and the part that closes it is shut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.poses import Array, SymmetryGroup, namespace, pose_error, transform
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Attributes: translation [m], rotation [rad], linear_speed [m/s], angular_speed [rad/s];
+    shut: how far from its shut limit a joint may stay [m or rad]; cavity_slack: how far a corner
+    of the bounding box may stick out of the cavity [m]."""
+
+    translation: float = 0.02
+    rotation: float = radians(15)
+    linear_speed: float = 0.01
+    angular_speed: float = 0.1
+    shut: float = 0.01
+    cavity_slack: float = 0.002
+
+
+def at_rest(
+    linear_speed: Float[Array, "*b"], angular_speed: Float[Array, "*b"], tolerance: Tolerance
+) -> Bool[Array, "*b"]:
+    """Whether both speeds are under their limits."""
+    return (linear_speed < tolerance.linear_speed) & (angular_speed < tolerance.angular_speed)
+
+
+def pose_goal_met(
+    label_pose: Float[Array, "*b 4 4"],
+    goal_pose: Float[Array, "*b 4 4"],
+    linear_speed: Float[Array, "*b"],
+    angular_speed: Float[Array, "*b"],
+    touched: Bool[Array, "*b"],
+    symmetry: SymmetryGroup,
+    tolerance: Tolerance,
+) -> Bool[Array, "*b"]:
+    """Whether the object rests at its goal, released.
+
+    Args:
+      label_pose: `T_world_label` of the object.
+      goal_pose: `T_world_label` it should have.
+      linear_speed: Of the object [m/s].
+      angular_speed: Of the object [rad/s].
+      touched: Whether the gripper touches the object.
+      symmetry: The object's.
+      tolerance: How close is close enough.
+    """
+    translation, rotation = pose_error(label_pose, goal_pose, symmetry)
+    near = (translation < tolerance.translation) & (rotation < tolerance.rotation)
+    return near & at_rest(linear_speed, angular_speed, tolerance) & ~touched
+
+
+def box_corners(extents: Float[np.ndarray, "3"]) -> Float[np.ndarray, "8 3"]:
+    """The corners of a centred box with these full lengths."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    return signs * np.asarray(extents) / 2
+
+
+def inside_cavity(
+    label_pose_cavity: Float[Array, "*b 4 4"],
+    label_extents: Float[Array, "3"],
+    cavity_extents: Float[Array, "3"],
+    slack: float,
+) -> Bool[Array, "*b"]:
+    """Whether the object's bounding box lies in the cavity.
+
+    Args:
+      label_pose_cavity: `T_cavity_label`; the cavity's frame is centred in it.
+      label_extents: Of the object's bounding box along the label's axes [m].
+      cavity_extents: Full lengths [m].
+      slack: How far a corner may stick out [m].
+    """
+    xp = namespace(label_pose_cavity)
+    corners = xp.asarray(box_corners(np.asarray(label_extents)), dtype=label_pose_cavity.dtype)
+    limit = xp.asarray(cavity_extents, dtype=label_pose_cavity.dtype) / 2 + slack
+    return xp.all(xp.abs(transform(label_pose_cavity, corners)) <= limit, axis=(-2, -1))
+
+
+def stored(
+    inside: Bool[Array, "*b"],
+    joint_position: Float[Array, "*b"],
+    joint_shut: float,
+    linear_speed: Float[Array, "*b"],
+    angular_speed: Float[Array, "*b"],
+    touched: Bool[Array, "*b"],
+    tolerance: Tolerance,
+) -> Bool[Array, "*b"]:
+    """Whether the object rests inside, released, and the drawer or door is shut."""
+    shut = joint_position - joint_shut < tolerance.shut
+    return inside & shut & at_rest(linear_speed, angular_speed, tolerance) & ~touched

@@ -1,0 +1,63 @@
+"""A runner without a simulator, and an evaluation of it that a test can kill."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.records import STAGES, EpisodeResult, Trajectory
+
+TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer")
+
+
+def make_runner(seconds: float = 0.0, diary: Path | None = None):
+    """A runner whose outcome follows from the seed alone; local, so that it pickles by value."""
+
+    def run(task, *, episode, seed, pose, assets, object_name):
+        start = time.perf_counter()
+        rng = np.random.default_rng(seed)
+        time.sleep(seconds * rng.uniform(0.5, 1.5))
+        success = bool(rng.random() < 0.8)
+        stage = None if success else STAGES[rng.integers(len(STAGES))]
+        result = EpisodeResult(
+            task=task,
+            episode=episode,
+            seed=seed,
+            object=object_name or "mug",
+            pose_source=pose,
+            success_once=success or bool(rng.random() < 0.3),
+            success_at_end=success,
+            failure=stage,
+            reason="" if success else f"the {stage} stage gave up",
+            translation_error=float(abs(rng.normal(0, 0.006 if success else 0.08))),
+            rotation_error=float(abs(rng.normal(0, 0.05 if success else 0.9))),
+            steps=int(rng.integers(100, 400)),
+            sim_time=float(rng.uniform(5, 20)),
+            max_penetration=float(rng.uniform(0, 0.002)),
+            wall_s=time.perf_counter() - start,
+        )
+        t = np.linspace(0, 2, 21)
+        qpos = np.stack([0.3 * np.sin(t + 0.1 * episode), 0.3 * np.cos(t)], axis=1)
+        names = ["move_to"] * 7 + ["grasp_at"] * 7 + ["release"] * 7
+        if diary is not None:
+            with diary.open("a") as file:
+                file.write(f"{task} {episode}\n")
+        return result, Trajectory(t, qpos.astype(np.float32), names)
+
+    return run
+
+
+def main(out: str, jobs: str, resume: str) -> None:
+    """Forty slow episodes, for a process that is killed before they end."""
+    from manipose_mj.evaluation.runner import evaluate
+
+    config = EvaluationConfig(TASKS, Path(out), episodes=20, seed=3, jobs=int(jobs))
+    evaluate(config, resume=resume == "resume", runner=make_runner(seconds=0.1))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
