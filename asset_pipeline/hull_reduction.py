@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from jaxtyping import Float
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 # Closer than this to the reduced hull, a point adds nothing a contact could notice [m].
 CLOSE = 2e-5
@@ -29,21 +29,19 @@ def reduced_hull(points: Float[np.ndarray, "n 3"], max_vertices: int) -> trimesh
     corners = np.asarray(points)[full.vertices]
     if len(corners) <= max_vertices:
         return trimesh.convex.convex_hull(corners)
-    middle = corners.mean(axis=0)
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     chosen = list(dict.fromkeys(np.argmax(corners @ directions.T, axis=0).tolist()))
-    while len(chosen) < 4 or np.linalg.matrix_rank(corners[chosen] - middle, tol=1e-9) < 3:
-        gaps = np.linalg.norm(corners[:, None] - corners[chosen], axis=2).min(axis=1)
-        chosen.append(int(gaps.argmax()))
-    hull = ConvexHull(corners[chosen], incremental=True, qhull_options="QJ")
     while len(chosen) < max_vertices:
-        outside = (corners @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
-        farthest = int(outside.argmax())
-        if outside[farthest] < CLOSE:
+        try:
+            planes = ConvexHull(corners[chosen]).equations
+        except QhullError:  # these few still lie in one plane
+            gaps = np.linalg.norm(corners[:, None] - corners[chosen], axis=2).min(axis=1)
+            chosen.append(int(gaps.argmax()))
+            continue
+        outside = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if outside.max() < CLOSE:
             break
-        chosen.append(farthest)
-        hull.add_points(corners[farthest : farthest + 1])
-    hull.close()
+        chosen.append(int(outside.argmax()))
     reduced = trimesh.convex.convex_hull(corners[chosen])
     growth = (full.volume / reduced.volume) ** (1 / 3)
     center = reduced.center_mass

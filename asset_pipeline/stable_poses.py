@@ -81,7 +81,9 @@ def verified(
     data = mujoco.MjData(model)
     standing = [p for p in poses if _tilt_after_settling(model, data, p, label) < MAX_TILT]
     if not standing:
-        raise InputError(f"body {body.name!r} topples from every one of its {len(poses)} rest poses")
+        raise InputError(
+            f"body {body.name!r} topples from every one of its {len(poses)} rest poses"
+        )
     total = sum(p.probability for p in standing)
     return tuple(replace(p, probability=p.probability / total) for p in standing)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from jaxtyping import Float
-from shapely.geometry import MultiPoint
+from scipy.spatial import ConvexHull
 
 from asset_pipeline.labelling.label import ObjectType, PoseLabel
 from asset_pipeline.labelling.surface_symmetry import SurfaceProbe, measured_symmetry, mirror
@@ -40,8 +40,8 @@ def scan_label(
       component in the mesh frame. If one holds, Y lies in it, towards the side that breaks the
       symmetry: where the bounding box reaches farther from the centroid of the surface.
     - functional: X is the side of the minimum-area rectangle seen from above (or `up`) nearest to
-      `functional`, towards it. Where the source does not know that direction, X is the longest of them,
-      towards the thinner end: the one farther from the surface's centroid. Y is `up` made
+      `functional`, towards it. Where the source does not know that direction, X is the longest of
+      them, towards the thinner end: the one farther from the surface's centroid. Y is `up` made
       perpendicular to X: tools lie flat and are gripped from above. The origin is where the width
       along X changes most: the split of the width profile into two constant pieces with the least
       squared error, midway across the slice there.
@@ -71,13 +71,14 @@ def scan_label(
             f"object type {object_type!r} of a scan; expected axial, mirror or functional"
         )
     probe = SurfaceProbe.of(mesh)
+    up = _own_axis(probe, vertices, up)
     if object_type == "axial":
-        rotation = _leaning(probe, vertices, _projected_frame(up))
+        rotation = _projected_frame(up)
         origin, extents = _box(vertices, rotation)
         symmetry = measured_symmetry(probe, rotation, origin, textured=textured)
         if symmetry.axial:
             return PoseLabel(origin, rotation, object_type, extents, symmetry)
-    rotation = _leaning(probe, vertices, _mirror_frame(mesh, vertices, up, probe))
+    rotation = _mirror_frame(mesh, vertices, up, probe)
     origin, extents = _box(vertices, rotation)
     symmetry = measured_symmetry(probe, rotation, origin, textured=textured)
     return PoseLabel(origin, rotation, object_type, extents, symmetry)
@@ -95,15 +96,12 @@ def _projected_frame(up: np.ndarray) -> Float[np.ndarray, "3 3"]:
     return _frame(up, x_axis if abs(up[0]) < 0.9 else y_axis)
 
 
-def _leaning(
-    probe: SurfaceProbe, vertices: np.ndarray, rotation: np.ndarray
-) -> Float[np.ndarray, "3 3"]:
-    """The frame with its X on the shape's own axis of half turns, if there is one close by."""
-    axis = probe.half_turn_axis(rotation[:, 0], _box(vertices, rotation)[0])
-    leaning = _frame(axis, rotation[:, 1])
-    half_turn = rotation_about(axis, np.pi)
-    near = axis @ rotation[:, 0] >= np.cos(MAX_LEAN)
-    return leaning if near and probe.holds(half_turn, _box(vertices, leaning)[0]) else rotation
+def _own_axis(probe: SurfaceProbe, vertices: np.ndarray, up: np.ndarray) -> Float[np.ndarray, "3"]:
+    """The shape's own axis of half turns, if there is one close to `up`; else `up`."""
+    axis = probe.half_turn_axis(up, _box(vertices, _projected_frame(up))[0])
+    center = _box(vertices, _projected_frame(axis))[0]
+    near = axis @ up >= np.cos(MAX_LEAN)
+    return axis if near and probe.holds(rotation_about(axis, np.pi), center) else up
 
 
 def _box(vertices: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -118,12 +116,17 @@ def _rectangle_axes(
 ) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Unit axes of the least rectangle around the outline along `up`, longer first; lengths."""
     plane = _projected_frame(up)[:, 1:]
-    corners = np.asarray(MultiPoint(vertices @ plane).minimum_rotated_rectangle.exterior.coords)
-    sides = np.diff(corners[:3], axis=0)
-    lengths = np.linalg.norm(sides, axis=1)
-    order = np.argsort(-lengths, kind="stable")
-    axes = [_positive(plane @ (sides[i] / lengths[i])) for i in order]
-    return axes[0], axes[1], float(lengths[order[0]]), float(lengths[order[1]])
+    outline = vertices @ plane
+    outline = outline[ConvexHull(outline).vertices]
+    # The least rectangle shares a side with the hull (Freeman and Shapira, 1975).
+    edges = np.roll(outline, -1, axis=0) - outline
+    along = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    lengths = np.stack([np.ptp(outline @ d.T, axis=0) for d in (along, across)], axis=1)
+    best = int(lengths.prod(axis=1).argmin())
+    sides = [(float(lengths[best, i]), plane @ d[best]) for i, d in enumerate((along, across))]
+    (long, long_axis), (short, short_axis) = sorted(sides, key=lambda s: -s[0])
+    return _positive(long_axis), _positive(short_axis), long, short
 
 
 def _positive(axis: np.ndarray) -> np.ndarray:

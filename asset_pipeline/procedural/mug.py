@@ -105,11 +105,11 @@ def generate(index: int = 0) -> Specimen:
     """Instance `index`: handle along +x, frame at the centre of the bounding box."""
     mug = design(index)
     sections = _handle_sections(mug)
-    widest = max(mug.foot, mug.rim) / 2
+    section = _wall_section(mug)
+    widest = section[0][:, 0].max()
     low = np.array([-widest, -widest, 0.0])
     high = np.array([sections[..., 0].max(), widest, mug.height])
     centre = (low + high) / 2
-    section = _wall_section(mug)
     mass = combine(
         [
             revolved_mass(np.concatenate(section), STONEWARE),

@@ -138,8 +138,8 @@ def print_on_cylinder(
 
 
 def box(
-    low: tuple[float, float, float],
-    high: tuple[float, float, float],
+    low: Float[np.ndarray, "3"],
+    high: Float[np.ndarray, "3"],
     rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0),
 ) -> Shape:
     """A box geom between two corners."""
@@ -147,3 +147,17 @@ def box(
     pose = np.eye(4)
     pose[:3, 3] = (lower + upper) / 2
     return Shape("box", tuple((upper - lower) / 2), pose, rgba=rgba)
+
+
+def rounded_box(
+    low: Float[np.ndarray, "3"],
+    high: Float[np.ndarray, "3"],
+    radius: float,
+    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0),
+) -> Shape:
+    """A box with rounded edges between two corners, as a mesh to look at."""
+    lower, upper = np.asarray(low, float), np.asarray(high, float)
+    x, y, z = (upper - lower) / 2
+    (mesh,) = rounded_box_bands((x, y, z), radius)
+    mesh.apply_translation((lower + upper) / 2)
+    return Shape("mesh", mesh=mesh, rgba=rgba)

@@ -53,8 +53,8 @@ def _tool(category: str, grams: float | None = None, **more) -> YcbObject:
 
 # Masses: the object table of Calli et al., "The YCB Object and Model Set: Towards Common Benchmarks
 # for Manipulation Research", ICAR 2015. None: the table gives only the set's total, or copies of it
-# disagree. The fruits are hollow plastic. `functional` is read off the scans; where it is missing, the
-# labeller takes the thinner end, which is wrong for spoons and hammers.
+# disagree. The fruits are hollow plastic. `functional` is read off the scans; where it is missing,
+# the labeller takes the thinner end, which is wrong for spoons and hammers.
 OBJECTS: dict[str, YcbObject] = {
     "001_chips_can": _axial("chips_can", 205),
     "002_master_chef_can": _axial("can", 414),

@@ -64,8 +64,12 @@ def run_and_report(config, *, resume: bool) -> int:
     from manipose_mj.evaluation.runner import evaluate as run
     from manipose_mj.evaluation.statistics import summarize
 
-    with output.EpisodeProgress() as progress:
-        results = run(config, resume=resume, on_progress=progress)
+    with output.Progress("episodes") as progress:
+
+        def show(done, total) -> None:
+            progress.update(len(done), total, f"{sum(r.success_at_end for r in done)} succeeded")
+
+        results = run(config, resume=resume, on_progress=show)
     with output.working_on("drawing the report"):
         report = write_report(config.out)
     console = output.standard_output()

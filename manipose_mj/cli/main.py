@@ -56,7 +56,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    sys.stderr.write(f"manipose: {' '.join(message.split())}\n")
+    from manipose_mj.cli import output  # loads rich, which `--help` need not wait for
+
+    output.fail_line(message)
     return code
 
 

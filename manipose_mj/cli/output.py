@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
-
-from manipose_mj.evaluation.records import EpisodeResult
 
 PIPED_WIDTH = 140
 QUIET_S = 2.0
@@ -48,34 +46,33 @@ def working_on(what: str) -> Iterator[None]:
         console.print(f"{what}: {took:.0f} s", highlight=False)
 
 
-class EpisodeProgress:
-    """Progress of an evaluation on standard error: a bar on a terminal, now and then a line elsewhere."""
+class Progress:
+    """How far something countable is, on standard error: a bar on a terminal, now and then a line elsewhere."""
 
-    def __init__(self) -> None:
+    def __init__(self, unit: str) -> None:
+        """Show nothing yet.
+
+        Args:
+          unit: What is counted, in the plural.
+        """
+        self._unit = unit
         self._console = standard_error()
         self._bar: Any = None
         self._start = time.monotonic()
         self._last = self._start + QUIET_S - REPORT_EVERY_S  # the first line comes after QUIET_S
 
-    def __enter__(self) -> EpisodeProgress:
+    def __enter__(self) -> Progress:
         if self._console.is_terminal:
-            from rich.progress import (
-                BarColumn,
-                MofNCompleteColumn,
-                Progress,
-                TextColumn,
-                TimeElapsedColumn,
-                TimeRemainingColumn,
-            )
+            from rich import progress
 
-            self._bar = Progress(
-                TextColumn("episodes"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.description}"),
-                TimeElapsedColumn(),
-                TextColumn("left"),
-                TimeRemainingColumn(),
+            self._bar = progress.Progress(
+                progress.TextColumn(self._unit),
+                progress.BarColumn(),
+                progress.MofNCompleteColumn(),
+                progress.TextColumn("{task.description}"),
+                progress.TimeElapsedColumn(),
+                progress.TextColumn("left"),
+                progress.TimeRemainingColumn(),
                 console=self._console,
             )
             self._bar.add_task("", total=None)
@@ -86,17 +83,20 @@ class EpisodeProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def __call__(self, done: Sequence[EpisodeResult], total: int) -> None:
-        """Say how far the evaluation is."""
-        succeeded = sum(r.success_at_end for r in done)
+    def update(self, done: int, total: int, note: str) -> None:
+        """Say that `done` of `total` are finished, and what came of them."""
         if self._bar is not None:
-            text = f"{succeeded} succeeded"
-            self._bar.update(self._bar.task_ids[0], completed=len(done), total=total, description=text)
+            self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=note)
         elif done and time.monotonic() - self._last > REPORT_EVERY_S:
             self._last = time.monotonic()
             seconds = self._last - self._start
-            text = f"{len(done)}/{total} episodes, {succeeded} succeeded, {seconds:.0f} s"
+            text = f"{done}/{total} {self._unit}, {note}, {seconds:.0f} s"
             self._console.print(text, highlight=False)
+
+
+def fail_line(message: str) -> None:
+    """One line on standard error about something wrong."""
+    sys.stderr.write(f"manipose: {' '.join(message.split())}\n")
 
 
 def summary_table(summary: dict[str, dict[str, Any]]) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -43,6 +43,8 @@ class MotionPlanner:
         self._rng = rng
         self._timing = Timing()
         self._line = LineConfig()
+        # Near a stretched arm the joints must turn fast for the hand to move slowly.
+        self._slow_line = replace(self._line, speed=0.05, turn_speed=0.3)
 
     def tcp_pose(self, joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
         """`T_world_tcp`."""
@@ -101,10 +103,14 @@ class MotionPlanner:
         """Joint targets along a straight line of the TCP to `goal`; None if it is not free."""
         start = self.tcp_pose(joints)
         self._arm.follow(self.scene)
-        poses = line_poses(start, goal, self._timestep, self._line)
-        targets = track(
-            self._arm, joints, poses, self._timestep, touched_bodies=touched, config=self._line
-        )
+        targets = None
+        for config in (self._line, self._slow_line):
+            poses = line_poses(start, goal, self._timestep, config)
+            targets = track(
+                self._arm, joints, poses, self._timestep, touched_bodies=touched, config=config
+            )
+            if targets is not None:
+                break
         if targets is None:
             return None
         with self.scene.query(clearance=clearance, target=target, carried=carried) as scene:

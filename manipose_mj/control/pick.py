@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,13 +19,14 @@ from manipose_mj.control.grasp_candidates import (
     reachable,
 )
 from manipose_mj.control.motion_planner import MotionPlanner, equivalent_poses
-from manipose_mj.control.planning_scene import CONTACT, carried_free_body
+from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
 from manipose_mj.poses import invert
 
 _STANDOFFS = (0.10, 0.06)
-# Grasps free of collision that are looked at further, and complete picks tried, at most.
-_MAX_FREE = 24
-_MAX_TRIES = 16
+# Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
+_MAX_PAIRS = 2400
+_MAX_APPROACHES = 40
+_MAX_TRIES = 12
 # The approach may brush nothing, but the open fingers pass the object closely.
 _APPROACH = replace(CONTACT, arm=0.002, target=0.0)
 
@@ -78,25 +80,30 @@ def pick_object(
     free = _free_of_collision(planner, grasps, reach, thing.geoms)
     if not len(free.index):
         raise StageFailure("plan", f"all {len(reach.index)} reachable grasps of {thing.name} collide")
+    approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
     tries = 0
-    pairs = _with_destination(grasps, free, thing, destinations)
-    if not pairs:
-        raise StageFailure(
-            "plan", f"none of {len(free.index)} free grasps of {thing.name} reaches its destination"
-        )
-    for index, joints, goal in pairs:
-        tries += 1
-        if tries > _MAX_TRIES:
+    for index, joints, goal in _with_destination(planner, grasps, free, thing, destinations):
+        if index not in approaches:
+            approaches[index] = _approach(planner, grasps, index, joints, thing.geoms, frozenset())
+        approach = approaches[index]
+        if tries == _MAX_TRIES or len(approaches) == _MAX_APPROACHES:
             break
+        if approach is None:
+            continue
+        tries += 1
         if destinations and not _can_set_down(planner, grasps, index, thing, destinations, goal):
             continue
-        found = _approach(planner, belief, grasps, index, joints, thing.geoms, frozenset())
-        if found is not None:
-            free_path, approach = found
-            return ObjectPick(
-                free_path, approach, float(grasps.widths[index]), float(grasps.openings[index]), goal
-            )
-    raise StageFailure("plan", f"no grasp of {thing.name} could be approached and set down again")
+        planner.scene.set_opening(float(grasps.openings[index]))
+        free_path = planner.free_path(belief.joints, approach[0])
+        if free_path is not None:
+            width, opening = float(grasps.widths[index]), float(grasps.openings[index])
+            return ObjectPick(free_path, approach, width, opening, goal)
+    counts = f"{len(free.index)} grasps of {thing.name} are free to take"
+    if not approaches:
+        raise StageFailure("plan", f"{counts}, none can have it at its destination")
+    if not tries:
+        raise StageFailure("plan", f"{counts}, none of {len(approaches)} has a straight approach")
+    raise StageFailure("plan", f"{counts}, none of {tries} could be carried out")
 
 
 def pick_part(
@@ -115,12 +122,13 @@ def pick_part(
         planner.scene.set_opening(float(grasps.openings[index]))
         if opening is not None and planner.part_path(joints, part, opening) is None:
             continue
-        found = _approach(planner, belief, grasps, index, joints, part.geoms, touched)
-        if found is not None:
-            free_path, approach = found
-            return PartPick(
-                free_path, approach, float(grasps.widths[index]), float(grasps.openings[index]), joints
-            )
+        approach = _approach(planner, grasps, index, joints, part.geoms, touched)
+        if approach is None:
+            continue
+        free_path = planner.free_path(belief.joints, approach[0])
+        if free_path is not None:
+            width, opening = float(grasps.widths[index]), float(grasps.openings[index])
+            return PartPick(free_path, approach, width, opening, joints)
     raise StageFailure(
         "plan",
         f"no grasp of {part.name}'s handle works: {len(grasps)} tried, {len(reach.index)} in reach, "
@@ -136,37 +144,48 @@ def _free_of_collision(
         planner.scene.set_opening(float(grasps.openings[index]))
         if not planner.collides(reach.joints[k], clearance=_APPROACH, target=target):
             kept.append(k)
-            if len(kept) == _MAX_FREE:
-                break
     return Reach(reach.index[kept], reach.joints[kept])
 
 
 def _with_destination(
+    planner: MotionPlanner,
     grasps: Grasps,
     free: Reach,
     thing: ObjectBelief,
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
-) -> list[tuple[int, Float[np.ndarray, "7"], Float[np.ndarray, "7"]]]:
-    """Grasp index, joints at the grasp and at a destination, the most promising first."""
+) -> Iterator[tuple[int, Float[np.ndarray, "7"], Float[np.ndarray, "7"]]]:
+    """Grasp index, joints at the grasp and at a destination, the most promising first.
+
+    At the destination the arm and what it carries are free of collision.
+    """
     if not destinations:
-        return [(int(i), q, q) for i, q in zip(free.index, free.joints, strict=True)]
+        yield from ((int(i), q, q) for i, q in zip(free.index, free.joints, strict=True))
+        return
     goals = equivalent_poses(destinations, thing.label.symmetry)
+    # Evenly spaced in quality: the best grasps alone may all be alike.
+    count = max(1, min(len(free.index), _MAX_PAIRS // len(goals)))
+    chosen = np.unique(np.linspace(0, len(free.index) - 1, count).astype(int))
+    free, count = Reach(free.index[chosen], free.joints[chosen]), len(chosen)
+    starts = np.repeat(free.joints, len(goals), axis=0)
     label_tcp = invert(thing.label_pose) @ grasps.tcp_poses[free.index]
     tcp_goals = (goals[None] @ label_tcp[:, None]).reshape(-1, 4, 4)
-    starts = np.repeat(free.joints, len(goals), axis=0)
     reach = reachable(tcp_goals, free.joints.mean(axis=0), extra_seeds=starts)
     travel = np.abs(reach.joints - starts[reach.index]).max(axis=1)
-    rank = (reach.index // len(goals)) / max(len(free.index), 1)
+    rank = (reach.index // len(goals)) / count
     # A short way with a middling grasp beats a long one with the best.
     order = np.argsort(travel + rank, kind="stable")
-    best: list[tuple[int, np.ndarray, np.ndarray]] = []
     used: dict[int, int] = {}
     for k in order:
         grasp = int(reach.index[k] // len(goals))
+        if used.get(grasp, 0) == 2:
+            continue
+        index = int(free.index[grasp])
+        carried = _carried(planner, grasps, index, thing)
+        planner.scene.set_opening(float(grasps.widths[index]))
+        if planner.collides(reach.joints[k], clearance=CONTACT, carried=carried):
+            continue
         used[grasp] = used.get(grasp, 0) + 1
-        if used[grasp] <= 2:
-            best.append((int(free.index[grasp]), free.joints[grasp], reach.joints[k]))
-    return best
+        yield index, free.joints[grasp], reach.joints[k]
 
 
 def _can_set_down(
@@ -177,26 +196,28 @@ def _can_set_down(
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     goal: Float[np.ndarray, "7"],
 ) -> bool:
-    inverse = invert(grasps.tcp_poses[index])
-    carried = carried_free_body(
-        planner.scene.model, thing.body, planner.free_joint(thing), inverse @ thing.pose
-    )
+    carried = _carried(planner, grasps, index, thing)
     planner.scene.set_opening(float(grasps.widths[index]))
-    pose_tcp = inverse @ thing.label_pose
+    pose_tcp = invert(grasps.tcp_poses[index]) @ thing.label_pose
     place = planner.place(pose_tcp, destinations, thing.label.symmetry, carried, goal)
     return place is not None
 
 
+def _carried(planner: MotionPlanner, grasps: Grasps, index: int, thing: ObjectBelief) -> Carried:
+    """The object in the hand, as this grasp would hold it."""
+    pose_tcp = invert(grasps.tcp_poses[index]) @ thing.pose
+    return carried_free_body(planner.scene.model, thing.body, planner.free_joint(thing), pose_tcp)
+
+
 def _approach(
     planner: MotionPlanner,
-    belief: Belief,
     grasps: Grasps,
     index: int,
     joints: Float[np.ndarray, "7"],
     target: np.ndarray,
     touched: frozenset[str],
-) -> tuple[Float[np.ndarray, "t 7"], Float[np.ndarray, "s 7"]] | None:
-    """Free path to the standoff and straight approach from there."""
+) -> Float[np.ndarray, "s 7"] | None:
+    """Joint targets of a straight approach to the grasp; None if there is none."""
     planner.scene.set_opening(float(grasps.openings[index]))
     for standoff in _STANDOFFS:
         back = planner.line(
@@ -206,9 +227,6 @@ def _approach(
             target=target,
             touched=touched,
         )
-        if back is None:
-            continue
-        free = planner.free_path(belief.joints, back[-1])
-        if free is not None:
-            return free, np.concatenate([back[::-1], joints[None]])
+        if back is not None:
+            return np.concatenate([back[::-1], joints[None]])
     return None

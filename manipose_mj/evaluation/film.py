@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import base64
-import io
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from jaxtyping import UInt8
-from PIL import Image
 
+from manipose_mj.control.failure import STAGES
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
+from manipose_mj.mjcf.film import encode_animation
+from manipose_mj.mjcf.pictures import Painter
 
-Picture = UInt8[np.ndarray, "h w 3"]
-Draw = Callable[[mujoco.MjModel, mujoco.MjData], Picture]
-
+CAMERA = "overview"
 STILLS = 6
 PLAYED_FPS = 12.0
 PLAYED_S = 6.0
+LAST_S = 1.5  # how long an animation shows how the episode ended
 
 
 @dataclass(frozen=True)
@@ -38,10 +37,10 @@ class Film:
     Attributes:
       kind: `"success"` or the failure's stage.
       result: The episode.
-      stills: In the order of time; empty where the episode left no trajectory.
+      stills: In the order of time; empty where the episode could not be drawn.
       animation: The whole episode as a `data:` address, if it was asked for.
       speed: How many times faster than simulated time the animation plays.
-      note: Why there are no pictures, where there are none.
+      note: Why something is missing, where it is.
     """
 
     kind: str
@@ -52,8 +51,18 @@ class Film:
     note: str = ""
 
 
+def choose(results: Sequence[EpisodeResult]) -> list[Film]:
+    """Films to be shot: of the first success and of the first episode of each kind of failure."""
+    films = []
+    for stage in (None, *STAGES):
+        first = next((r for r in results if r.failure == stage), None)
+        if first is not None:
+            films.append(Film(stage or "success", first))
+    return films
+
+
 def shoot(
-    film: Film, model: mujoco.MjModel, trajectory: Trajectory, draw: Draw, *, animate: bool
+    film: Film, model: mujoco.MjModel, trajectory: Trajectory, painter: Painter, *, animate: bool
 ) -> Film:
     """The film with its stills and, if asked for, its animation.
 
@@ -61,36 +70,38 @@ def shoot(
       film: What to complete.
       model: The scene of the episode.
       trajectory: Its states.
-      draw: Makes a picture of a state.
+      painter: Makes a picture of a state.
       animate: Whether to draw the animation too, which takes a dozen times as long.
 
     Raises:
-      ValueError: The trajectory is of another model.
+      ValueError: The trajectory is of another model, or has no state.
     """
-    if trajectory.qpos.ndim != 2 or trajectory.qpos.shape[1] != model.nq:
-        raise ValueError(f"the trajectory has shape {trajectory.qpos.shape}, the model {model.nq}")
+    count = len(trajectory.times)
+    if trajectory.qpos.shape != (count, model.nq) or not count:
+        shape = trajectory.qpos.shape
+        raise ValueError(f"{count} states of shape {shape} do not fit a scene of {model.nq}")
     data = mujoco.MjData(model)
 
-    def picture(index: int) -> Picture:
+    def picture(index: int) -> np.ndarray:
         data.qpos[:] = trajectory.qpos[index]
-        data.time = trajectory.times[index]
         mujoco.mj_forward(model, data)
-        return draw(model, data)
+        return painter.paint(data, CAMERA)
 
-    count = len(trajectory.times)
+    shown = _spread(count, STILLS)
     stills = tuple(
         Still(_address([picture(i)]), f"{trajectory.times[i]:.1f} s {trajectory.annotations[i]}")
-        for i in _spread(count, STILLS)
+        for i in shown
     )
     if not animate:
         return replace(film, stills=stills)
-    indices = _spread(count, round(PLAYED_FPS * PLAYED_S))
+    played = _spread(count, round(PLAYED_FPS * PLAYED_S))
+    frames = [picture(i) for i in played]
     duration = float(trajectory.times[-1] - trajectory.times[0])
     return replace(
         film,
         stills=stills,
-        animation=_address([picture(i) for i in indices]),
-        speed=max(1.0, duration * PLAYED_FPS / len(indices)),
+        animation=_address(frames + frames[-1:] * round(PLAYED_FPS * LAST_S)),
+        speed=duration * PLAYED_FPS / len(frames),
     )
 
 
@@ -99,15 +110,6 @@ def _spread(count: int, wanted: int) -> list[int]:
     return sorted({math.floor(i + 0.5) for i in np.linspace(0, count - 1, min(count, wanted))})
 
 
-def _address(pictures: list[Picture]) -> str:
-    """One picture, or an animation that repeats for ever, as a WebP in a `data:` address."""
-    first, *rest = [Image.fromarray(p) for p in pictures]
-    buffer = io.BytesIO()
-    if rest:
-        # The last picture stays for a while: it shows how the episode ended.
-        milliseconds = [round(1000 / PLAYED_FPS)] * len(rest) + [1500]
-        options = {"save_all": True, "append_images": rest, "duration": milliseconds, "loop": 0}
-        first.save(buffer, "WEBP", quality=60, method=3, **options)
-    else:
-        first.save(buffer, "WEBP", quality=82, method=4)
-    return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+def _address(frames: list[np.ndarray]) -> str:
+    webp = encode_animation(frames, fps=PLAYED_FPS)
+    return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")

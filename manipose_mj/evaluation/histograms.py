@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from manipose_mj.evaluation.records import EpisodeResult
+from manipose_mj.tasks.success import Tolerance
 
 # Stand-ins that no other part of the drawing uses; the page's own colours replace them.
 COLOURS = {"#010203": "currentColor", "#040506": "var(--good)", "#070809": "var(--bad)"}
@@ -19,18 +20,18 @@ INK, GOOD, BAD = COLOURS
 BINS = 20
 
 
-def error_histograms(results: Sequence[EpisodeResult], tolerance: tuple[float, float]) -> list[str]:
+def error_histograms(results: Sequence[EpisodeResult], tolerance: Tolerance) -> list[str]:
     """SVG elements: final translation error [cm] and rotation error [deg], where episodes have them.
 
     Args:
       results: Episodes of one task.
-      tolerance: Of the translation [m] and the rotation [rad]. The axis shows about three times as
-        much, and its last bin takes everything beyond.
+      tolerance: Of the task's goal. The axis shows three times as much, and its last bin takes
+        everything beyond.
     """
     figures = []
     for name, unit, field, factor, limit in (
-        ("translation error", "cm", "translation_error", 100.0, tolerance[0]),
-        ("rotation error", "deg", "rotation_error", math.degrees(1.0), tolerance[1]),
+        ("translation error", "cm", "translation_error", 100.0, tolerance.translation),
+        ("rotation error", "deg", "rotation_error", math.degrees(1.0), tolerance.rotation),
     ):
         values = [
             [

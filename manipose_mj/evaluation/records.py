@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.control.failure import STAGES
 from manipose_mj.errors import InputError
-
-STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics")
 
 
 @dataclass(frozen=True)

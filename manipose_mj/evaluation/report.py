@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import logging
-import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import timedelta
 from itertools import groupby
 from pathlib import Path
@@ -17,10 +17,9 @@ import mujoco
 from markupsafe import Markup
 
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.film import Draw, Film, shoot
+from manipose_mj.evaluation.film import Film, choose, shoot
 from manipose_mj.evaluation.histograms import error_histograms
 from manipose_mj.evaluation.records import (
-    STAGES,
     EpisodeResult,
     read_results,
     read_trajectory,
@@ -29,54 +28,65 @@ from manipose_mj.evaluation.records import (
 )
 from manipose_mj.evaluation.runner import RESULTS_FILE, SUMMARY_FILE
 from manipose_mj.evaluation.statistics import wilson_interval
+from manipose_mj.mjcf import gl
+from manipose_mj.mjcf.pictures import painter
+from manipose_mj.tasks.success import Tolerance
 
 REPORT_FILE = "report.html"
-TOLERANCE = (0.02, math.radians(15))
-CAMERA, HEIGHT, WIDTH = "overview", 288, 384
+HEIGHT, WIDTH = 270, 360  # of every picture; without GL a larger one costs seconds
 
 logger = logging.getLogger(__name__)
 
+# `scene(task, seed=, assets=, object_name=)` is the model in which an episode took place.
 Scene = Callable[..., mujoco.MjModel]
 
 
-def write_report(
-    out: Path, *, scene: Scene | None = None, draw: Draw | None = None, animate_failures: bool | None = None
-) -> Path:
+def simulated(task: str, **options: Any) -> mujoco.MjModel:
+    """The scene of every real evaluation."""
+    from manipose_mj.control.episode import scene_model
+
+    return scene_model(task, **options)
+
+
+def write_report(out: Path, *, scene: Scene = simulated) -> Path:
     """Write `report.html` into the folder of a finished evaluation.
+
+    What cannot be drawn is left out with a line that says why.
 
     Args:
       out: The evaluation's folder.
-      scene: `scene(task, seed=, assets=, object_name=)`, the model of an episode; the simulator's by default.
-      draw: Makes a picture of a state; by default with the best renderer that works here.
-      animate_failures: Whether failures get an animation as successes do; by default where GL makes it cheap.
+      scene: Makes the model of an episode.
 
     Returns:
       The report's path.
 
     Raises:
-      InputError: The folder holds no finished evaluation, or cannot be written.
+      InputError: The folder holds no finished evaluation.
     """
     results, _ = read_results(out / RESULTS_FILE)
     try:
         summary = json.loads((out / SUMMARY_FILE).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError, ValueError):
-        raise InputError(f"{out / SUMMARY_FILE}: missing or unreadable; run the evaluation first") from None
+        path = out / SUMMARY_FILE
+        raise InputError(f"{path}: missing or unreadable; run the evaluation first") from None
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("manipose_mj.evaluation", "."),
         autoescape=True,
+        undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters["scaled"] = _scaled
+    ordered = sorted(results, key=lambda r: r.key)
     html = environment.get_template("report_template.html").render(
         summary=summary,
-        versions=summary["versions"],
         sections=[
-            _section(out, task, list(episodes), summary, scene, draw, animate_failures)
-            for task, episodes in groupby(sorted(results, key=lambda r: r.key), key=lambda r: r.task)
+            _section(out, task, list(episodes), summary, scene)
+            for task, episodes in groupby(ordered, key=lambda r: r.task)
         ],
-        stages=STAGES,
+        episodes=len(results),
         wall=timedelta(seconds=round(sum(r.wall_s for r in results))),
+        no_animation="" if gl.working_backend() else gl.why_not(),
     )
     path = out / REPORT_FILE
     write_atomically(path, html.encode("utf-8"))
@@ -84,23 +94,39 @@ def write_report(
 
 
 def _section(
-    out: Path,
-    task: str,
-    results: list[EpisodeResult],
-    summary: dict[str, Any],
-    scene: Scene | None,
-    draw: Draw | None,
-    animate_failures: bool | None,
+    out: Path, task: str, results: list[EpisodeResult], summary: dict[str, Any], scene: Scene
 ) -> dict[str, Any]:
     return {
         "task": task,
-        "id": task.replace("/", "-"),
+        "anchor": task.replace("/", "-"),
         "row": summary["tasks"][task],
-        "results": results,
-        "histograms": [Markup(svg) for svg in error_histograms(results, TOLERANCE)],
         "objects": _by_object(results),
-        "films": [],
+        "histograms": [Markup(svg) for svg in error_histograms(results, Tolerance())],
+        "films": [_drawn(film, out, summary, scene) for film in choose(results)],
+        "failed": [r for r in results if r.failure is not None],
     }
+
+
+def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film:
+    """The film with its pictures, or with the reason why it has none."""
+    result = film.result
+    path = trajectory_path(out, result.task, result.episode)
+    if not path.exists():
+        return replace(film, note="no pictures: the episode left no trajectory")
+    animate = film.kind == "success" and gl.working_backend() is not None
+    try:
+        trajectory = read_trajectory(path)
+        model = scene(
+            result.task,
+            seed=result.seed,
+            assets=None if summary["assets"] is None else Path(summary["assets"]),
+            object_name=summary["object"],
+        )
+        with painter(model, HEIGHT, WIDTH) as paint:
+            return shoot(film, model, trajectory, paint, animate=animate)
+    except Exception as error:  # the numbers must not be lost for a picture
+        logger.debug("episode %d of %s", result.episode, result.task, exc_info=True)
+        return replace(film, note=f"no pictures: {' '.join(str(error).split())}")
 
 
 def _by_object(results: Sequence[EpisodeResult]) -> list[dict[str, Any]]:

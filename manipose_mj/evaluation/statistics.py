@@ -13,7 +13,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from manipose_mj.evaluation.records import STAGES, EpisodeResult
+from manipose_mj.control.failure import STAGES
+from manipose_mj.evaluation.records import EpisodeResult
 
 VERSIONED = ("mujoco", "dm_control", "mink", "numpy", "manipose_mj")
 
@@ -38,7 +39,8 @@ def summarize_task(results: Sequence[EpisodeResult]) -> dict[str, Any]:
     """Counts, interval and medians of the episodes of one task.
 
     `wilson_95` bounds the rate of success at the end. Errors are medians over the episodes that
-    have them, None where none has; `failures` names the stages that occurred, in their order.
+    have them, None where none has; `failures` names the stages that occurred, in their order;
+    `seeds` are the episodes' own.
     """
     at_end = sum(r.success_at_end for r in results)
     once = sum(r.success_once for r in results)
@@ -54,6 +56,7 @@ def summarize_task(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "median_translation_error_m": _median(r.translation_error for r in results),
         "median_rotation_error_rad": _median(r.rotation_error for r in results),
         "max_penetration_m": max(r.max_penetration for r in results),
+        "seeds": [r.seed for r in results],
     }
 
 

@@ -14,7 +14,7 @@ from manipose_mj.mjcf.ray_camera import Intrinsics
 from manipose_mj.poses import transform
 
 NO_INSTANCE = -1
-_STEEPEST = 4.0  # depth step between neighbours, in pixel footprints, that ends a surface: 76 deg
+_STEEPEST = 4.0  # depth step between neighbours, in footprints, that ends a surface: 76 deg
 _CREASE = 0.7  # change of that step from which the two sides are not averaged
 
 
@@ -148,10 +148,10 @@ def normals_from_points(
 ) -> Float[np.ndarray, "height width 3"]:
     """Normals towards the camera of an organised cloud in the camera frame.
 
-    The cross product of the steps across and down the image: on each axis the mean of the steps to
-    both neighbours where the surface goes on smoothly, else the one with the smaller change of depth,
-    which stays on the pixel's own surface. Zero where the surface is steeper than 76 deg on both
-    sides, or nothing was seen (depth 0).
+    The cross product of the steps across and down the image. On each axis a step is the mean of
+    those to both neighbours where the surface goes on smoothly, else the one with the smaller
+    change of depth, which stays on the pixel's own surface. Zero where the surface is steeper than
+    76 deg on both sides, or nothing was seen (depth 0).
     """
     across, across_known = _surface_step(points, axis=1)
     down, down_known = _surface_step(points, axis=0)

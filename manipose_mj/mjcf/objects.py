@@ -23,8 +23,6 @@ class RigidObject(composer.Entity):
         # The arena's attachment frame carries the free joint instead of the stand-alone model's.
         for joint in self._mjcf_root.find_all("joint"):
             joint.remove()
-        for joint in self._mjcf_root.worldbody.find_all("freejoint"):
-            joint.remove()
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:

@@ -16,13 +16,15 @@ from manipose_mj.mjcf.ray_casting import (
     bundle_rays,
     cast_rays,
     geom_colours,
+    rotated,
     visible_geoms,
 )
 from manipose_mj.mjcf.surface_colours import SurfaceColours, to_display
 from manipose_mj.poses import compose
 
 _SURFACE_OFFSET = 1e-3  # [m], keeps a surface from shading itself
-_FOG_DISTANCE = 12.0  # [m], where the floor fades into the horizon
+_FOG_DISTANCE = 14.0  # [m], where the floor fades into the horizon
+_PHASES = 4  # sets of light places that neighbouring pixels take turns at
 _SOLID = 0.95  # opacity from which a geom hides what is behind it and throws a shadow
 
 
@@ -48,9 +50,9 @@ class RayLook:
     sky: tuple[float, float, float] = (0.36, 0.40, 0.46)
     ground: tuple[float, float, float] = (0.16, 0.145, 0.13)
     camera_light: float = 0.14
-    light_radius: float = 0.05
-    zenith: tuple[float, float, float] = (0.32, 0.47, 0.72)
-    horizon: tuple[float, float, float] = (0.80, 0.86, 0.93)
+    light_radius: float = 0.035
+    zenith: tuple[float, float, float] = (0.24, 0.40, 0.66)
+    horizon: tuple[float, float, float] = (0.60, 0.69, 0.80)
 
 
 class RayPainter:
@@ -77,10 +79,12 @@ class RayPainter:
         eye = camera_pose(self._model, data, camera)
         slopes = intrinsics.slopes()
         y, x = np.indices(self._size)
-        # Neighbours see the light at different places, so that a soft shadow shows as contrast.
-        turn = (y % samples) * samples + x % samples
+        phase = (2 * y + x) % _PHASES
+        # Neighbours see the light at different places of its rim, so that all of a soft shadow's
+        # edge shows as contrast.
+        rim = samples**2 * _PHASES - 1 - phase
         picture = self._trace(
-            data, eye, image_rays(intrinsics), slopes.reshape(-1, 2), turn.ravel()
+            data, eye, image_rays(intrinsics), slopes.reshape(-1, 2), rim.ravel()
         ).reshape(height, width, 3)
         if samples > 1:
             contrast = maximum_filter(picture, (3, 3, 1)) - minimum_filter(picture, (3, 3, 1))
@@ -89,7 +93,7 @@ class RayPainter:
             offset = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
             offset = offset / (intrinsics.fx, intrinsics.fy)
             xy = (slopes[rough][:, None] + offset).reshape(-1, 2)
-            turn = np.tile(np.arange(samples**2), np.count_nonzero(rough))
+            turn = (np.arange(samples**2) * _PHASES + phase[rough][:, None]).ravel()
             fine = self._trace(data, eye, bundle_rays(xy), xy, turn)
             # Averaging what the display shows keeps bright edges smooth.
             picture[rough] = fine.reshape(-1, samples**2, 3).mean(axis=1)
@@ -106,7 +110,8 @@ class RayPainter:
         """Display values in 0..1 along the rays of the given slopes; `turn` is each ray's light."""
         alpha = geom_colours(self._model)[:, 3]
         shown = visible_geoms(self._model, PICTURE_GROUPS)
-        rays = np.concatenate([xy, np.ones((len(xy), 1))], axis=1) @ T_world_camera[:3, :3].T
+        rays = np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
+        rays = rotated(rays, T_world_camera[:3, :3])
         unit = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
         picture = self._sky(unit)
         solid = cast_rays(
@@ -177,14 +182,15 @@ class RayPainter:
         axis = np.median(points, axis=0) - light
         distance = float(np.linalg.norm(axis))
         rotation = _looking_along(axis / distance)
-        places = self._look.supersampling**2
-        radius = self._look.light_radius * distance if places > 1 else 0.0
+        places = self._look.supersampling**2 * _PHASES
+        radius = self._look.light_radius * distance
         for place in range(places):
-            angle = 2 * np.pi * (place + 0.5) / places
+            # Vogel's sunflower covers the disc evenly, and so does every fourth of its seeds.
+            angle, reach = place * np.pi * (3 - np.sqrt(5)), np.sqrt((place + 0.5) / places)
             shift = np.cos(angle) * rotation[:, 0] + np.sin(angle) * rotation[:, 1]
-            T_world_light = compose(rotation, light + radius * shift)
+            T_world_light = compose(rotation, light + radius * reach * shift)
             mine = np.flatnonzero(turn == place)
-            local = (points[mine] - T_world_light[:3, 3]) @ rotation
+            local = rotated(points[mine] - T_world_light[:3, 3], rotation.T)
             before = local[:, 2] > _SURFACE_OFFSET  # what lies beside the light is lit
             mine, local = mine[before], local[before]
             bundles = bundle_rays(local[:, :2] / local[:, 2:])

@@ -19,8 +19,8 @@ class SurfaceColours:
     """Colours of hit points, with textures read once and kept.
 
     A ray reports no texture coordinates. A plane's follow from the point; a textured mesh is
-    sampled densely once and a hit takes the colour of the nearest sample; anything else (cube maps on
-    primitives) gets its texture's mean colour.
+    sampled densely once and a hit takes the colour of the nearest sample; anything else (cube maps
+    on primitives) gets its texture's mean colour.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -112,14 +112,16 @@ def _plane_lookup(model: mujoco.MjModel, geom: int, image: np.ndarray) -> _Looku
     material = int(model.geom_matid[geom])
     repeat = model.mat_texrepeat[material].astype(float)
     size = model.geom_size[geom, :2]
-    if not model.mat_texuniform[material]:
-        repeat = repeat / np.where(size > 0, 2 * size, 2.0)
+    # As GL shows it: a repeat spans two metres, or, stretched over a finite plane, its length.
+    stretched = (size > 0) & (not model.mat_texuniform[material])
+    scale = repeat / np.where(stretched, 2 * size, 2.0) * np.array([1.0, -1.0])
+    offset = np.where(stretched, repeat, 1.0) / 2
     mean = image.reshape(-1, 3).mean(axis=0)
 
     def lookup(local: np.ndarray) -> np.ndarray:
         # Far repeats are finer than a pixel; the mean keeps them from flickering.
         far = np.clip(np.linalg.norm(local[:, :2], axis=1) / 8.0 - 0.25, 0.0, 1.0)[:, None]
-        return (1 - far) * _texels(image, local[:, :2] * repeat + 0.5) + far * mean
+        return (1 - far) * _texels(image, local[:, :2] * scale + offset) + far * mean
 
     return lookup
 

@@ -15,10 +15,7 @@ from manipose_mj.errors import InputError
 
 BOX = "".join(
     f"v {x} {y} {z}\n" for x in (0, 0.05) for y in (0, 0.06) for z in (0, 0.07)
-) + "".join(
-    f"f {a} {b} {c}\n"
-    for a, b, c in np.asarray(trimesh.creation.box().faces) + 1
-)
+) + "".join(f"f {a} {b} {c}\n" for a, b, c in np.asarray(trimesh.creation.box().faces) + 1)
 
 
 def _obj(folder: Path, text: str) -> Path:

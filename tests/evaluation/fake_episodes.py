@@ -6,10 +6,12 @@ import sys
 import time
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
+from manipose_mj.control.failure import STAGES
 from manipose_mj.evaluation.config import EvaluationConfig
-from manipose_mj.evaluation.records import STAGES, EpisodeResult, Trajectory
+from manipose_mj.evaluation.records import EpisodeResult, Trajectory
 
 TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer")
 
@@ -49,6 +51,26 @@ def make_runner(seconds: float = 0.0, diary: Path | None = None):
         return result, Trajectory(t, qpos.astype(np.float32), names)
 
     return run
+
+
+def scene(task, *, seed, assets, object_name) -> mujoco.MjModel:
+    """A scene that fits the fake runner's trajectories: a pendulum of two links."""
+    return mujoco.MjModel.from_xml_string("""
+    <mujoco>
+      <worldbody>
+        <light pos="0 -1 3"/>
+        <camera name="overview" pos="0 -2 0.4" xyaxes="1 0 0 0 0 1"/>
+        <geom type="plane" size="2 2 0.1" rgba="0.8 0.8 0.75 1"/>
+        <body pos="0 0 0.8">
+          <joint type="hinge" axis="0 1 0"/>
+          <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.05" rgba="0.8 0.3 0.2 1"/>
+          <body pos="0 0 -0.3">
+            <joint type="hinge" axis="0 1 0"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.25" size="0.04" rgba="0.2 0.4 0.8 1"/>
+          </body>
+        </body>
+      </worldbody>
+    </mujoco>""")
 
 
 def main(out: str, jobs: str, resume: str) -> None:

@@ -147,7 +147,7 @@ def test_bad_input(scene):
     with pytest.raises(InputError, match="depth image"):
         cloud_from_depth(
             np.ones((3, 3)),
-            np.zeros((4, 5), int),
+            np.zeros((3, 3), int),
             camera_intrinsics(model, "a", 4, 5),
             camera_pose(model, data, "a"),
         )

@@ -78,7 +78,7 @@ def test_shadow_lies_away_from_the_light(top):
 
 def test_the_lit_side_is_brighter(scene):
     picture = render(*scene, "side", 120, 160, engine="ray").astype(float)
-    rows, columns = np.nonzero((picture[..., 0] > 1.5 * picture[..., 1]))
+    rows, columns = np.nonzero(picture[..., 0] > 1.5 * picture[..., 1])
     middle = columns.mean()
     ball = picture[rows, columns, 0]
     assert ball[columns > middle + 3].mean() > 1.15 * ball[columns < middle - 3].mean()

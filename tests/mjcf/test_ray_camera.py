@@ -195,9 +195,7 @@ def test_intrinsics_of_a_sensor(clutter):
     """Focal lengths and the principal point scale with the image; the middle of 80 is 39.5."""
     model, _ = clutter
     k = camera_intrinsics(model, "sensor", 60, 80).matrix
-    np.testing.assert_allclose(
-        k, [[80, 0, 39.5 - 8], [0, 84, 29.5 + 7.2], [0, 0, 1]], rtol=1e-5
-    )
+    np.testing.assert_allclose(k, [[80, 0, 39.5 - 8], [0, 84, 29.5 + 7.2], [0, 0, 1]], rtol=1e-5)
 
 
 @pytest.mark.parametrize(
