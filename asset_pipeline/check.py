@@ -11,6 +11,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from asset_pipeline.assets import Asset, list_assets, read_asset
+from asset_pipeline.emit import SOLIMP, SOLREF
 from asset_pipeline.stable_poses import tilt
 from manipose_mj.errors import InputError
 from manipose_mj.poses import pose_to_vector, quaternion_to_rotation
@@ -135,7 +136,10 @@ def standing_model(asset: Asset) -> mujoco.MjModel:
     spec.option.impratio = 10.0
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     if asset.kind == "rigid":
-        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], condim=4)
+        plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1])
+        # MuJoCo averages the contact parameters of two geoms: the plane is as hard as a table is.
+        plane.condim, plane.solref = 4, np.fromstring(SOLREF, sep=" ")
+        plane.solimp[:3] = np.fromstring(SOLIMP, sep=" ")
     child = mujoco.MjSpec.from_file(str(asset.model_path))
     spec.attach(child, frame=spec.worldbody.add_frame(), prefix="asset/")
     return spec.compile()

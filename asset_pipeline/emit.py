@@ -19,9 +19,10 @@ from manipose_mj.poses import pose_to_vector
 COLLISION_GROUP = "3"
 VISUAL_GROUP = "2"
 # MuJoCo's contacts soften with the mass of what they push; with the default impedance a light box
-# that an arm sets down sinks 7 mm into the table, with these 0.3 mm.
+# that an arm sets down sinks 7 mm into the table, with these less than 1 mm. A first impedance
+# above 0.8 makes thin objects with many contacts chatter.
 SOLREF = "0.01 1"
-SOLIMP = "0.99 0.999 0.001"
+SOLIMP = "0.8 0.999 0.001"
 
 
 def write_asset(asset: Asset, bodies: tuple[Body, ...]) -> Asset:
@@ -108,7 +109,7 @@ def _body_element(
     for index, shape in enumerate(body.collision):
         geom = _geom_element(element, assets, shape, f"{body.name}_collision_{index:02d}", folder)
         geom.set("group", COLLISION_GROUP)
-        geom.set("condim", "4")
+        geom.set("condim", "6" if body.friction[2] > 0 else "4")
         geom.set("friction", _numbers(body.friction))
         geom.set("solref", SOLREF)
         geom.set("solimp", SOLIMP)

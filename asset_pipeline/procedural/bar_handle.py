@@ -24,7 +24,7 @@ class BarHandle:
     thickness: float = 0.011
     standoff: float = 0.036
     inset: float = 0.014
-    rounding: float = 0.003
+    rounding: float = 0.002
     rgba: Colour = (0.16, 0.16, 0.17, 1.0)
 
 

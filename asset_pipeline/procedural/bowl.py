@@ -19,15 +19,17 @@ from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_
 from manipose_mj.poses import SymmetryGroup
 
 STONEWARE = 2300.0  # [kg/m^3]
-RINGS = (12, 16, 20)  # wedges of each ring, from the foot to the rim
+WEDGES = 16  # of each of two rings of wall
 CURVE_POINTS = 24
+JOINT = 11  # the curve's point between the rings: there the parts' errors are alike
+RECESS = 0.0013  # under the foot [m]; its collision disc is flat
 
 
 @dataclass(frozen=True)
 class Bowl:
     """Sizes [m] and colours.
 
-    Attributes: diameter and height, over all; wall; foot, outer diameter of the foot ring; ring, its
+    Attributes: diameter, before the lip is rounded; height, over all; wall; foot, outer diameter of the foot ring; ring, its
     height; bend, where the wall's curve turns up (two shares; 1, 0 would be an edge); colours of
     the outside, the inside and the rim.
     """
@@ -65,7 +67,7 @@ def design(index: int) -> Bowl:
         wall=round(float(rng.uniform(0.0034, 0.005)), 4),
         foot=round(float(diameter * rng.uniform(0.42, 0.50)), 4),
         ring=round(float(rng.uniform(0.005, 0.007)), 4),
-        bend=(round(float(rng.uniform(0.60, 0.72)), 3), round(float(rng.uniform(0.15, 0.28)), 3)),
+        bend=(round(float(rng.uniform(0.58, 0.70)), 3), round(float(rng.uniform(0.19, 0.30)), 3)),
         outside=outside,
         inside=inside,
         rim=rim,
@@ -78,6 +80,7 @@ def generate(index: int = 0) -> Specimen:
     outer, inner = _wall_curves(bowl)
     section = _section(bowl, outer, inner)
     lift = bowl.height / 2
+    widest = 2 * float(max(part[:, 0].max() for part in section))
     mass = revolved_mass(np.concatenate(section), STONEWARE)
     centre = mass.center_of_mass - [0.0, 0.0, lift]
     body = Body(
@@ -94,7 +97,7 @@ def generate(index: int = 0) -> Specimen:
         # X is the axis, up; nothing fixes Y: it is x of the frame.
         rotation=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
         object_type="axial",
-        extents=np.array([bowl.height, bowl.diameter, bowl.diameter]),
+        extents=np.array([bowl.height, widest, widest]),
         symmetry=SymmetryGroup.about_x(),
     )
     return Specimen(label, (body,))
@@ -124,7 +127,7 @@ def _section(
     bowl: Bowl, outer: Float[np.ndarray, "n 2"], inner: Float[np.ndarray, "n 2"]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Outside, rim and inside profile, from the axis under the foot back to the axis."""
-    foot, recess = bowl.foot / 2, 0.45 * bowl.ring
+    foot, recess = bowl.foot / 2, RECESS
     under = np.array([[0, recess], [foot - 0.0055, recess], [foot - 0.0045, 0], [foot, 0]])
     floor = np.array([[0, inner[0, 1]]])
     corners = np.concatenate([under, outer, inner[::-1], floor])
@@ -144,13 +147,12 @@ def _collision(
     disc = np.eye(4)
     disc[2, 3] = (bottom + inner[0, 1]) / 2
     shapes = [Shape("cylinder", (bowl.foot / 2, (inner[0, 1] - bottom) / 2), disc)]
-    ends = np.round(np.linspace(0, CURVE_POINTS - 1, len(RINGS) + 1)).astype(int)
-    for start, stop, count in zip(ends[:-1], ends[1:], RINGS, strict=True):
+    for start, stop in ((0, JOINT), (JOINT, CURVE_POINTS - 1)):
         outside = outer[[start, (start + stop) // 2, stop]]
         chord = inner[[start, stop]]
         # The inner side is hollow this way too: half the chord's sagitta on either side of it.
         along = chord[1] - chord[0]
         into = np.array([along[1], -along[0]]) / np.linalg.norm(along)
         sagitta = ((inner[start:stop] - chord[0]) @ into).max()
-        shapes += wall_wedges(outside, chord + into * sagitta / 2, count)
+        shapes += wall_wedges(outside, chord + into * sagitta / 2, WEDGES)
     return tuple(shapes)

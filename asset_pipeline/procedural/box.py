@@ -46,14 +46,14 @@ class Carton:
     body: Colour = (0.76, 0.10, 0.12, 1.0)
     band: Colour = (0.97, 0.80, 0.22, 1.0)
     ink: Colour = (0.12, 0.22, 0.52, 1.0)
-    edge: float = 0.0022
+    edge: float = 0.0018
 
 
 # Depth, width, height [m], bulk density of the content [kg/m^3].
 _KINDS: tuple[tuple[tuple[float, float], tuple[float, float], tuple[float, float], float], ...] = (
     ((0.055, 0.066), (0.115, 0.140), (0.170, 0.210), 190.0),  # crackers
     ((0.060, 0.068), (0.072, 0.110), (0.120, 0.140), 180.0),  # tea
-    ((0.030, 0.036), (0.085, 0.110), (0.090, 0.110), 560.0),  # pudding powder
+    ((0.030, 0.036), (0.080, 0.092), (0.105, 0.115), 560.0),  # pudding powder
     ((0.058, 0.063), (0.090, 0.096), (0.160, 0.170), 1030.0),  # juice, 1 l
     ((0.060, 0.070), (0.060, 0.070), (0.130, 0.200), 1030.0),  # milk, square
     ((0.036, 0.040), (0.085, 0.092), (0.165, 0.178), 860.0),  # sugar
@@ -121,24 +121,26 @@ def _content(half: np.ndarray, density: float):
 
 
 def _looks(carton: Carton, square: bool) -> tuple[Shape, ...]:
-    """Body, two bands, and an emblem on every side; printed as symmetrically as the box is."""
+    """Body, bands and a printed panel on every side; the print is as symmetric as the box."""
     x, y, z = carton.depth / 2, carton.width / 2, carton.height / 2
-    inner, outer = 0.66 * z, 0.78 * z
+    inner, outer = 0.72 * z, 0.84 * z
     bands = rounded_box_bands((x, y, z), carton.edge, (-outer, -inner, inner, outer))
     colours = (carton.body, carton.band, carton.body, carton.band, carton.body)
     shapes = [
         Shape("mesh", mesh=mesh, rgba=rgba) for mesh, rgba in zip(bands, colours, strict=True)
     ]
-    wide, narrow = (y, y) if square else (y, x)
     for turn in range(4):
-        distance, half = ((x, wide), (y, narrow))[turn % 2]
+        distance, half = ((x, y), (y, y if square else x))[turn % 2]
         face = _face(turn * np.pi / 2, distance)
-        size = 0.74 * min(half, 0.8 * inner)
-        oval = ellipse((size, min(1.2 * size, 0.84 * inner)))
-        bar = rounded_rectangle((0.70 * size, 0.15 * size), 0.05 * size)
-        for layer, (outline, rgba) in enumerate(
-            ((oval, WHITE), (0.88 * oval, carton.ink), (bar, WHITE)), start=1
-        ):
+        panel = 0.78 * half, 0.82 * inner
+        oval = 0.84 * panel[0], min(0.60 * panel[1], 1.5 * panel[0])
+        label = 0.70 * oval[0], 0.26 * oval[1]
+        outlines = (
+            (rounded_rectangle(panel, 0.12 * min(panel)), WHITE),
+            (ellipse(oval), carton.band),
+            (rounded_rectangle(label, 0.3 * min(label)), carton.ink),
+        )
+        for layer, (outline, rgba) in enumerate(outlines, start=1):
             shapes.append(Shape("mesh", mesh=print_on_face(outline, face, layer), rgba=rgba))
     return tuple(shapes)
 

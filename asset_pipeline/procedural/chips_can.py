@@ -21,6 +21,8 @@ from manipose_mj.poses import SymmetryGroup
 
 YCB_MASS = 0.205  # [kg], with its chips
 PAPER, STEEL, POLYETHYLENE = 750.0, 7850.0, 930.0  # [kg/m^3]
+# Without rolling friction a lying can would roll for ever; its chips shift and soon stop it.
+FRICTION = (0.8, 0.005, 0.001)
 METAL: Colour = (0.74, 0.75, 0.77, 1.0)
 CREAM: Colour = (0.97, 0.95, 0.88, 1.0)
 
@@ -76,6 +78,7 @@ def generate(index: int = 0) -> Specimen:
         collision=(Shape("cylinder", (radius, half)),),
         visual=_looks(can),
         mass_properties=_mass(can),
+        friction=FRICTION,
     )
     label = PoseLabel(
         origin=np.zeros(3),

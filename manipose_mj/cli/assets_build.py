@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.evaluate import CORES, one_thread_per_process
+from manipose_mj.cli.process import CORES, one_thread_per_process
 
 
 def build_assets(
@@ -52,6 +52,5 @@ def build_assets(
         f"{len(built)} built, {len(results) - len(built) - len(failed)} up to date, "
         f"{len(failed)} failed, in {out}",
         soft_wrap=True,
-        highlight=False,
     )
     return 2 if failed else 0

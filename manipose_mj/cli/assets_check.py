@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.evaluate import CORES, one_thread_per_process
+from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
 
@@ -58,7 +58,7 @@ def check_assets(
     console = output.standard_output()
     if len(unreadable) < len(results):
         console.print(table)
-        console.print(f"{sum(r.ok for r in results)} of {len(results)} ok", highlight=False)
+        console.print(f"{sum(r.ok for r in results)} of {len(results)} ok")
     for result in results:
         for reason in (unreadable[result.name],) if result.name in unreadable else result.failures:
             output.fail_line(reason if result.name in reason else f"{result.name}: {reason}")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.cli.process import CORES
+
 if TYPE_CHECKING:
     from asset_pipeline.assets import Asset
 
@@ -25,9 +27,10 @@ def list_objects(
     """
     from asset_pipeline.assets import list_assets, read_asset
     from manipose_mj.cli import output
+    from manipose_mj.cli.builtin_objects import all_names, load_objects
 
     if directory is None:
-        assets = _builtin()
+        assets = load_objects(all_names(), CORES)
     else:
         assets = [read_asset(folder) for folder in list_assets(directory)]
     rows = [summary(asset) for asset in assets]
@@ -69,11 +72,3 @@ def summary(asset: Asset) -> dict[str, Any]:
         "graspable": lying or any(part.handle is not None for part in asset.parts),
         "folder": str(asset.folder),
     }
-
-
-def _builtin() -> list[Asset]:
-    from asset_pipeline import catalogue
-    from manipose_mj.cli import output
-
-    with output.working_on("building the built-in objects"):
-        return [catalogue.load_by_name(name) for name in catalogue.NAMES]

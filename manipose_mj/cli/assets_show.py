@@ -81,8 +81,10 @@ def _part(part: Any) -> str:
 
 def _symmetry(asset: Asset) -> str:
     group = asset.label.symmetry
-    turns = f"{len(group.rotations)} discrete"
-    return f"any turn about X, {turns}" if group.axial else turns
+    turns = len(group.rotations) - 1
+    found = ["any turn about X"] if group.axial else []
+    found += [f"{turns} more turn{'s' if turns > 1 else ''}"] if turns else []
+    return ", ".join(found) or "none"
 
 
 def _vector(values: Any, digits: int = 1) -> str:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import arg
 
-from manipose_mj.cli.evaluate import CORES, one_thread_per_process, run_and_report
+from manipose_mj.cli.evaluate import run_and_report
+from manipose_mj.cli.process import CORES, one_thread_per_process
 
 EPISODES = 4
+MARK = ".demo"
 
 
 def demo(
@@ -25,22 +26,28 @@ def demo(
       jobs: Episodes at the same time, one core each.
     """
     one_thread_per_process()
+    from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.suite import ALL_TASKS
 
     tasks = tuple("/".join(task) for task in ALL_TASKS)
     config = EvaluationConfig(tasks, out, episodes=EPISODES, jobs=jobs)
-    _forget_earlier_demo(config)
+    _claim(out)
+    load_objects(names_in_tasks(), jobs)
     return run_and_report(config, resume=False)
 
 
-def _forget_earlier_demo(config) -> None:
-    """Drop the results of the same demo; anything else in the folder stays, and is refused later."""
-    from manipose_mj.evaluation.runner import RESULTS_FILE, RUN_FILE
+def _claim(out: Path) -> None:
+    """Drop an earlier demo's results and mark the folder as a demo's.
 
-    try:
-        before = json.loads((config.out / RUN_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return
-    if all(before.get(name) == value for name, value in config.identity.items()):
-        (config.out / RESULTS_FILE).unlink(missing_ok=True)
+    Results that are not a demo's stay, and the evaluation then refuses the folder.
+    """
+    from manipose_mj.evaluation.runner import RESULTS_FILE
+
+    results = out / RESULTS_FILE
+    mark = out / MARK
+    if mark.exists():
+        results.unlink(missing_ok=True)
+    elif not results.exists():
+        out.mkdir(parents=True, exist_ok=True)
+        mark.write_text("`manipose demo` replaces the results in this folder.\n", encoding="utf-8")

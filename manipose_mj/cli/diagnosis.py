@@ -131,7 +131,7 @@ def _mujoco_rollout() -> str:
     import numpy as np
     from mujoco import rollout
 
-    from manipose_mj.cli.evaluate import CORES
+    from manipose_mj.cli.process import CORES
 
     model = mujoco.MjModel.from_xml_string(_SCENE)
     data = [mujoco.MjData(model) for _ in range(CORES)]
@@ -160,7 +160,9 @@ def _mjx_warp() -> str:
     warp.config.quiet = True
     devices = [d.name for d in warp.get_cuda_devices()]
     if not devices:
-        raise RuntimeError("installed, but there is no CUDA device; it needs an NVIDIA GPU and driver")
+        raise RuntimeError(
+            "installed, but there is no CUDA device; it needs an NVIDIA GPU and driver"
+        )
     return f"warp {warp.__version__} on {', '.join(devices)}"
 
 

@@ -10,28 +10,30 @@ def doctor() -> int:
     if something that every command needs is missing.
     """
     from rich.table import Table
+    from rich.text import Text
 
     from manipose_mj.cli import output
     from manipose_mj.cli.diagnosis import examine
 
     with output.working_on("trying renderers and engines"):
         findings = examine()
-    table = Table("", "what", "status", "detail", title="ManiPose-MJ on this machine", title_justify="left")
+    table = Table(
+        "", "what", "status", "detail", title="ManiPose-MJ on this machine", title_justify="left"
+    )
     group = ""
     for finding in findings:
         table.add_row(
             "" if finding.group == group else finding.group,
             finding.what,
-            f"[{STYLES[finding.status]}]{finding.status}[/]",
+            Text(finding.status, STYLES[finding.status]),
             finding.detail,
-            end_section=False,
         )
         group = finding.group
     console = output.standard_output()
     console.print(table)
     missing = [f.what for f in findings if f.status == "missing"]
     if missing:
-        console.print(f"needed and missing: {', '.join(missing)}", highlight=False)
+        console.print(f"needed and missing: {', '.join(missing)}")
         return 1
-    console.print("everything needed is here; what is absent is optional", highlight=False)
+    console.print("everything needed is here; what is absent is optional")
     return 0

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
-
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def evaluate(
@@ -41,6 +39,7 @@ def evaluate(
       object_name: The one object to manipulate, by its asset's name.
     """
     one_thread_per_process()
+    from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
     from manipose_mj.evaluation.config import EvaluationConfig
 
     if out is None:
@@ -49,6 +48,9 @@ def evaluate(
         out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
     config = EvaluationConfig(tasks, out, episodes, seed, pose, jobs, assets, object_name)
     check_names(tasks, assets, object_name)
+    if assets is None:
+        # Once and here: workers would each build the same.
+        load_objects([object_name] if object_name else names_in_tasks(), jobs)
     return run_and_report(config, resume=resume)
 
 
@@ -74,30 +76,25 @@ def run_and_report(config, *, resume: bool) -> int:
         report = write_report(config.out)
     console = output.standard_output()
     console.print(output.summary_table(summarize(results)))
-    console.print(f"report: {report}", soft_wrap=True, highlight=False)
+    console.print(f"report: {report}", soft_wrap=True)
     return 0
-
-
-def one_thread_per_process() -> None:
-    """Hold BLAS to one thread, as in the workers; no effect once NumPy is loaded.
-
-    Episodes get their speed from `--jobs`, and sums must not depend on the number of threads.
-    """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def check_names(tasks: tuple[str, ...], assets: Path | None, object_name: str | None) -> None:
     """Find misspelt names before anything is written."""
+    from asset_pipeline.assets import list_assets
+    from manipose_mj.cli.builtin_objects import all_names
     from manipose_mj.suite import ALL_TASKS
 
     known = ["/".join(task) for task in ALL_TASKS]
     for task in tasks:
         if task not in known:
             raise unknown_name("task", task, known)
-    if assets is not None:
-        from asset_pipeline.assets import list_assets
-
-        names = [folder.name for folder in list_assets(assets)]
-        if object_name is not None and object_name not in names:
-            raise unknown_name(f"object in {assets}", object_name, names)
+    if assets is None:
+        names, place = all_names(), "built-in object"
+    else:
+        names, place = [folder.name for folder in list_assets(assets)], f"object in {assets}"
+        if object_name is None:
+            raise InputError(f"--assets {assets} needs --object: one of {', '.join(names)}")
+    if object_name is not None and object_name not in names:
+        raise unknown_name(place, object_name, names)

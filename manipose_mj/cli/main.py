@@ -11,6 +11,7 @@ import tyro
 from tyro.extras import SubcommandApp
 
 from manipose_mj.cli import assets, demo, doctor, evaluate, render, tasks
+from manipose_mj.cli.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
 DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
@@ -35,9 +36,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     0: done; 1: done, and something failed a check; 2: the input or its place on disk was wrong;
     130: interrupted.
     """
+    hush_glfw()
     try:
         config = (tyro.conf.FlagCreatePairsOff,)
-        return build_app().cli(prog="manipose", description=DESCRIPTION, args=argv, config=config) or 0
+        return (
+            build_app().cli(prog="manipose", description=DESCRIPTION, args=argv, config=config) or 0
+        )
     except InputError as error:
         return _fail(str(error), EXIT_INPUT)
     except WorkerDiedError as error:

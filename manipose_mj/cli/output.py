@@ -19,12 +19,13 @@ REPORT_EVERY_S = 15.0
 
 def standard_output() -> Console:
     """For results. As wide as the tables need where nobody's window limits it."""
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, soft_wrap=False)
+    width = None if sys.stdout.isatty() else PIPED_WIDTH
+    return Console(width=width, markup=False, highlight=False)
 
 
 def standard_error() -> Console:
     """For progress and notes."""
-    return Console(stderr=True)
+    return Console(stderr=True, markup=False, highlight=False)
 
 
 def write_json(document: Any) -> None:
@@ -43,7 +44,7 @@ def working_on(what: str) -> Iterator[None]:
     start = time.monotonic()
     yield
     if (took := time.monotonic() - start) > QUIET_S:
-        console.print(f"{what}: {took:.0f} s", highlight=False)
+        console.print(f"{what}: {took:.0f} s")
 
 
 class Progress:
@@ -91,7 +92,7 @@ class Progress:
             self._last = time.monotonic()
             seconds = self._last - self._start
             text = f"{done}/{total} {self._unit}, {note}, {seconds:.0f} s"
-            self._console.print(text, highlight=False)
+            self._console.print(text)
 
 
 def fail_line(message: str) -> None:

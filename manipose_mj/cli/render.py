@@ -52,4 +52,4 @@ def render(
         picture = draw(model, data, camera, height, width, engine="auto")
     out.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(picture).save(out)
-    output.standard_output().print(f"picture: {out}", soft_wrap=True, highlight=False)
+    output.standard_output().print(f"picture: {out}", soft_wrap=True)

@@ -9,13 +9,14 @@ def list_tasks(*, json: bool = False) -> None:
     Args:
       json: Print JSON, for other programs.
     """
-    from asset_pipeline.catalogue import CATALOGUE
+    from asset_pipeline import catalogue
     from manipose_mj.cli import output
     from manipose_mj.suite import ALL_TASKS, describe
 
     tasks = [{"task": f"{d}/{t}", "description": describe(d, t)} for d, t in ALL_TASKS]
+    objects = {category: catalogue.instances(category) for category in catalogue.names()}
     if json:
-        output.write_json({"tasks": tasks, "objects": list(CATALOGUE)})
+        output.write_json({"tasks": tasks, "objects": objects})
         return
     from rich.table import Table
 
@@ -24,4 +25,7 @@ def list_tasks(*, json: bool = False) -> None:
     for row in tasks:
         table.add_row(row["task"], row["description"])
     console.print(table)
-    console.print(f"Built-in objects: {', '.join(CATALOGUE)}", highlight=False)
+    table = Table("category", "objects", title="Built-in objects", title_justify="left")
+    for category, instances in objects.items():
+        table.add_row(category, f"{instances[0]} to {instances[-1]}")
+    console.print(table)

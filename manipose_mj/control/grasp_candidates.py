@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from manipose_mj.control.batch_ik import seeds_for, solve
+from manipose_mj.control.batch_ik import forward, seeds_for, solve
 from manipose_mj.control.belief import ObjectBelief, PartBelief
 from manipose_mj.mjcf.panda import MAX_OPENING
 from manipose_mj.poses import compose, rotation_about
@@ -17,6 +17,8 @@ OPENING_MARGIN = 0.012
 # Of the approach to a handle, about its long axis [rad], and along it [m].
 HANDLE_TILTS = (0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79)
 HANDLE_SLIDES = (0.0, 0.025, -0.025)
+# Smallest singular value of the Jacobian (m and rad alike) from which straight motions still go.
+MIN_DEXTERITY = 0.06
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -77,13 +79,19 @@ def reachable(
     *,
     extra_seeds: Float[np.ndarray, "n 7"] | None = None,
 ) -> Reach:
-    """Of each reachable pose the solution nearest to the configuration `near`."""
+    """Of each reachable pose the solution nearest to the configuration `near`.
+
+    Solutions next to a singularity do not count: the arm could not leave them in a straight line.
+    """
     if not len(tcp_poses):
         return Reach(np.empty(0, int), np.empty((0, 7)))
     seeds = seeds_for(tcp_poses)
     if extra_seeds is not None:
         seeds = np.concatenate([seeds, extra_seeds[None]])
     joints, solved = solve(tcp_poses, seeds)
+    _, jacobian = forward(joints[solved])
+    least = np.linalg.eigvalsh(jacobian @ jacobian.transpose(0, 2, 1))[:, 0]
+    solved[solved] = least > MIN_DEXTERITY**2
     distance = np.where(solved, np.abs(joints - near).sum(axis=-1), np.inf)
     best = distance.argmin(axis=0)
     index = np.flatnonzero(np.isfinite(distance.min(axis=0)))

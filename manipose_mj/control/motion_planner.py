@@ -18,6 +18,8 @@ from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about
 
 # Heights from which an object is lowered to its place, best first [m].
 _DESCENTS = (0.10, 0.06, 0.03)
+# How far to back off after letting go, best first [m]; the last must do.
+RETREATS = (0.12, 0.09, 0.06)
 _MAX_PLACES = 8
 # Of every so many control steps one is checked for collision.
 _CHECK_EVERY = 4
@@ -148,6 +150,11 @@ class MotionPlanner:
 
     def _lowered(self, joints: Float[np.ndarray, "7"], carried: Carried) -> Place | None:
         if self.collides(joints, clearance=CONTACT, carried=carried):
+            return None
+        # What is let go stays behind: only the arm has to get away.
+        alone = replace(CONTACT, carried=-np.inf)
+        back = self.backed_off(joints, RETREATS[-1])
+        if self.line(joints, back, clearance=alone, carried=carried) is None:
             return None
         for height in _DESCENTS:
             above = self.tcp_pose(joints)

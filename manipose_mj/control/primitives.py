@@ -11,7 +11,7 @@ from manipose_mj.control.belief import Belief, PartBelief
 from manipose_mj.control.executor import Actions, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import OPENING_MARGIN
-from manipose_mj.control.motion_planner import MotionPlanner
+from manipose_mj.control.motion_planner import RETREATS, MotionPlanner
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
 from manipose_mj.control.planning_scene import CONTACT, carried_free_body
@@ -24,7 +24,6 @@ _LOST_ANGLE = 0.6
 # Of a part's joint from where it should have gone, as a share of its range.
 _OPENING_TOLERANCE = 0.12
 _LIFTS = (0.10, 0.06, 0.03)
-_RETREATS = (0.12, 0.09, 0.06)
 _SETTLE = 0.25  # after letting go [s]
 
 
@@ -89,7 +88,7 @@ class Primitives:
     def _retreat(self, belief: Belief, name: str) -> Float[np.ndarray, "t 7"]:
         thing = belief.parts.get(name) or belief.objects[name]
         clearance = replace(CONTACT, arm=0.0)
-        for distance in _RETREATS:
+        for distance in RETREATS:
             line = self._planner.line(
                 belief.joints,
                 self._planner.backed_off(belief.joints, distance),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -13,13 +13,27 @@ import numpy as np
 from manipose_mj.control.failure import STAGES
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
 from manipose_mj.mjcf.film import encode_animation
-from manipose_mj.mjcf.pictures import Painter
+from manipose_mj.mjcf.pictures import painter
 
 CAMERA = "overview"
 STILLS = 6
-PLAYED_FPS = 12.0
-PLAYED_S = 6.0
+STILL_SIZE = (270, 360)  # height and width in pixels
 LAST_S = 1.5  # how long an animation shows how the episode ended
+
+
+@dataclass(frozen=True)
+class Playback:
+    """An animation's look. Attributes: height, width [pixels]; fps: frames a second; seconds: it lasts."""
+
+    height: int
+    width: int
+    fps: float
+    seconds: float = 6.0
+
+
+WITH_GL = Playback(height=360, width=480, fps=12.0)
+# Each picture costs a quarter of a second there.
+WITHOUT_GL = Playback(height=180, width=240, fps=5.0)
 
 
 @dataclass(frozen=True)
@@ -62,7 +76,7 @@ def choose(results: Sequence[EpisodeResult]) -> list[Film]:
 
 
 def shoot(
-    film: Film, model: mujoco.MjModel, trajectory: Trajectory, painter: Painter, *, animate: bool
+    film: Film, model: mujoco.MjModel, trajectory: Trajectory, playback: Playback | None
 ) -> Film:
     """The film with its stills and, if asked for, its animation.
 
@@ -70,8 +84,7 @@ def shoot(
       film: What to complete.
       model: The scene of the episode.
       trajectory: Its states.
-      painter: Makes a picture of a state.
-      animate: Whether to draw the animation too, which takes a dozen times as long.
+      playback: The animation's look; None leaves it out, which is several times as fast.
 
     Raises:
       ValueError: The trajectory is of another model, or has no state.
@@ -80,29 +93,33 @@ def shoot(
     if trajectory.qpos.shape != (count, model.nq) or not count:
         shape = trajectory.qpos.shape
         raise ValueError(f"{count} states of shape {shape} do not fit a scene of {model.nq}")
-    data = mujoco.MjData(model)
-
-    def picture(index: int) -> np.ndarray:
-        data.qpos[:] = trajectory.qpos[index]
-        mujoco.mj_forward(model, data)
-        return painter.paint(data, CAMERA)
-
     shown = _spread(count, STILLS)
     stills = tuple(
-        Still(_address([picture(i)]), f"{trajectory.times[i]:.1f} s {trajectory.annotations[i]}")
-        for i in shown
+        Still(_address([picture], 1.0), f"{trajectory.times[i]:.1f} s {trajectory.annotations[i]}")
+        for i, picture in zip(shown, _pictures(model, trajectory, shown, *STILL_SIZE), strict=True)
     )
-    if not animate:
+    if playback is None:
         return replace(film, stills=stills)
-    played = _spread(count, round(PLAYED_FPS * PLAYED_S))
-    frames = [picture(i) for i in played]
+    played = _spread(count, round(playback.fps * playback.seconds))
+    frames = list(_pictures(model, trajectory, played, playback.height, playback.width))
     duration = float(trajectory.times[-1] - trajectory.times[0])
     return replace(
         film,
         stills=stills,
-        animation=_address(frames + frames[-1:] * round(PLAYED_FPS * LAST_S)),
-        speed=duration * PLAYED_FPS / len(frames),
+        animation=_address(frames + frames[-1:] * round(playback.fps * LAST_S), playback.fps),
+        speed=duration * playback.fps / len(frames),
     )
+
+
+def _pictures(
+    model: mujoco.MjModel, trajectory: Trajectory, indices: list[int], height: int, width: int
+) -> Iterator[np.ndarray]:
+    data = mujoco.MjData(model)
+    with painter(model, height, width) as drawing:
+        for index in indices:
+            data.qpos[:] = trajectory.qpos[index]
+            mujoco.mj_forward(model, data)
+            yield drawing.paint(data, CAMERA)
 
 
 def _spread(count: int, wanted: int) -> list[int]:
@@ -110,6 +127,6 @@ def _spread(count: int, wanted: int) -> list[int]:
     return sorted({math.floor(i + 0.5) for i in np.linspace(0, count - 1, min(count, wanted))})
 
 
-def _address(frames: list[np.ndarray]) -> str:
-    webp = encode_animation(frames, fps=PLAYED_FPS)
+def _address(frames: list[np.ndarray], fps: float) -> str:
+    webp = encode_animation(frames, fps=fps)
     return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")

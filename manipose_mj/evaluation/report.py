@@ -17,7 +17,7 @@ import mujoco
 from markupsafe import Markup
 
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.film import Film, choose, shoot
+from manipose_mj.evaluation.film import WITH_GL, WITHOUT_GL, Film, choose, shoot
 from manipose_mj.evaluation.histograms import error_histograms
 from manipose_mj.evaluation.records import (
     EpisodeResult,
@@ -29,11 +29,9 @@ from manipose_mj.evaluation.records import (
 from manipose_mj.evaluation.runner import RESULTS_FILE, SUMMARY_FILE
 from manipose_mj.evaluation.statistics import wilson_interval
 from manipose_mj.mjcf import gl
-from manipose_mj.mjcf.pictures import painter
 from manipose_mj.tasks.success import Tolerance
 
 REPORT_FILE = "report.html"
-HEIGHT, WIDTH = 270, 360  # of every picture; without GL a larger one costs seconds
 
 logger = logging.getLogger(__name__)
 
@@ -86,7 +84,7 @@ def write_report(out: Path, *, scene: Scene = simulated) -> Path:
         ],
         episodes=len(results),
         wall=timedelta(seconds=round(sum(r.wall_s for r in results))),
-        no_animation="" if gl.working_backend() else gl.why_not(),
+        no_gl="" if gl.working_backend() else gl.why_not(),
     )
     path = out / REPORT_FILE
     write_atomically(path, html.encode("utf-8"))
@@ -113,7 +111,9 @@ def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film
     path = trajectory_path(out, result.task, result.episode)
     if not path.exists():
         return replace(film, note="no pictures: the episode left no trajectory")
-    animate = film.kind == "success" and gl.working_backend() is not None
+    playback = WITHOUT_GL if gl.working_backend() is None else WITH_GL
+    if film.kind != "success":
+        playback = None
     try:
         trajectory = read_trajectory(path)
         model = scene(
@@ -122,8 +122,7 @@ def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film
             assets=None if summary["assets"] is None else Path(summary["assets"]),
             object_name=summary["object"],
         )
-        with painter(model, HEIGHT, WIDTH) as paint:
-            return shoot(film, model, trajectory, paint, animate=animate)
+        return shoot(film, model, trajectory, playback)
     except Exception as error:  # the numbers must not be lost for a picture
         logger.debug("episode %d of %s", result.episode, result.task, exc_info=True)
         return replace(film, note=f"no pictures: {' '.join(str(error).split())}")

@@ -52,7 +52,14 @@ def simulate(task: str, **options: Any) -> tuple[EpisodeResult, Trajectory]:
     """The runner of every real evaluation: the baseline policy in MuJoCo."""
     from manipose_mj.control.episode import run_episode  # loads the simulator: workers only
 
-    return run_episode(task, **options)
+    # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
+    simulator_log = logging.getLogger("absl")
+    level = simulator_log.level
+    simulator_log.setLevel(logging.ERROR)
+    try:
+        return run_episode(task, **options)
+    finally:
+        simulator_log.setLevel(level)
 
 
 def _ignore(done: Sequence[EpisodeResult], total: int) -> None: ...

@@ -55,7 +55,7 @@ class TableArena(composer.Arena):
         table.add(
             "geom", name="table", type="box", size=TABLE_HALF_EXTENTS, pos=TABLE_CENTER,
             rgba=[0.72, 0.58, 0.43, 1], friction=[0.8, 0.005, 0.0001], condim=4,
-            solref=[0.01, 1], solimp=[0.99, 0.999, 0.001, 0.5, 2],
+            solref=[0.01, 1], solimp=[0.8, 0.999, 0.001, 0.5, 2],
         )  # fmt: skip
         thickness = 2 * TABLE_HALF_EXTENTS[2]
         leg = (TABLE_HEIGHT - thickness) / 2

@@ -54,9 +54,7 @@ def test_results_do_not_depend_on_the_number_of_jobs(tmp_path: Path) -> None:
 
 
 def test_seeds_depend_on_base_task_and_episode_only() -> None:
-    seeds = {
-        episode_seed(s, task, e) for s in range(3) for task in fake.TASKS for e in range(50)
-    }
+    seeds = {episode_seed(s, task, e) for s in range(3) for task in fake.TASKS for e in range(50)}
     assert len(seeds) == 300
     assert episode_seed(0, "single_object/target_pose", 0) == 478385717, "old results lost"
 
@@ -225,7 +223,9 @@ def test_a_number_that_is_not_finite_costs_one_episode(tmp_path: Path) -> None:
         return result, trajectory
 
     results = evaluate(config(tmp_path, episodes=2), runner=infinite)
-    assert [r.failure == "physics" and r.steps == 0 for r in results if r.episode == 0] == [True] * 2
+    assert [r.failure == "physics" and r.steps == 0 for r in results if r.episode == 0] == [
+        True
+    ] * 2
 
 
 def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path: Path) -> None:
@@ -253,7 +253,8 @@ def test_trajectories_come_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{"tasks": ()}, {"tasks": ("a/b", "a/b")}, {"episodes": 0}, {"jobs": 0}, {"seed": -1}]
+    "changes",
+    [{"tasks": ()}, {"tasks": ("a/b", "a/b")}, {"episodes": 0}, {"jobs": 0}, {"seed": -1}],
 )
 def test_configuration_is_checked(tmp_path: Path, changes: dict) -> None:
     with pytest.raises(InputError):
