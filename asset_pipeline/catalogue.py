@@ -6,7 +6,6 @@ machine; index 0 of a category is its typical specimen, the others vary sizes, s
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 import tempfile
@@ -24,28 +23,13 @@ from asset_pipeline.finish import finish_rigid
 from asset_pipeline.labelling.label import ObjectType
 from asset_pipeline.procedural import bowl, box, cabinet, chips_can, mug
 from asset_pipeline.procedural.specimen import Specimen
+from asset_pipeline.source_hash import source_hash
 from manipose_mj.errors import InputError, unknown_name
 
 log = logging.getLogger(__name__)
 
 CACHE_VARIABLE = "MANIPOSE_CACHE"
 LICENCE = "Apache-2.0"
-
-# Everything that a built folder depends on, under the package's folder.
-_SOURCES = (
-    "assets.py",
-    "catalogue.py",
-    "emit.py",
-    "finish.py",
-    "geometry.py",
-    "grasp_physics.py",
-    "grasps.py",
-    "gripper.py",
-    "labelling/label.py",
-    "mass.py",
-    "procedural/*.py",
-    "stable_poses.py",
-)
 
 
 @dataclass(frozen=True)
@@ -216,9 +200,4 @@ def _fill_cache(row: Category, index: int, folder: Path) -> None:
 
 @cache
 def _code_hash() -> str:
-    package = Path(__file__).parent
-    digest = hashlib.sha256(version("mujoco").encode())
-    for pattern in _SOURCES:
-        for path in sorted(package.glob(pattern)):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:12]
+    return source_hash(__name__, version("mujoco"))

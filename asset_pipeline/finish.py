@@ -49,12 +49,7 @@ def finish_rigid(
     touching = trimesh.util.concatenate([s.surface(SECTIONS) for s in body.collision])
     poses = stable_poses(touching, body.mass_properties.center_of_mass, label=label)
     poses = verified(poses, body, label=label)
-    grasps = sample_grasps(
-        body.surface(),
-        body.collision,
-        poses,
-        center_of_mass=body.mass_properties.center_of_mass,
-    )
+    grasps = sample_grasps(body, poses)
     asset = Asset(
         folder=Path(folder),
         name=name,

@@ -13,6 +13,7 @@ from asset_pipeline.gripper import ParallelJaw
 
 PLANE_CLEARANCE = 0.003  # [m]
 SPREAD = 0.05  # a distance that counts as much as 60 degrees between approaches [m]
+CLEAR_SHARE = 0.9  # of the places; the others are open to grasps that no support allows
 
 
 def clear_of_plane(
@@ -37,33 +38,47 @@ def diverse(
 ) -> Int[np.ndarray, "k"]:
     """Indices of at most `count` grasps, best first.
 
-    Farthest-point choice weighted by quality: half of the places are shared out among the stable
-    poses, for grasps that are clear in them; the rest are open.
+    Farthest-point choice weighted by quality. Most places are shared out equally among the stable
+    poses and their pairs, as a grasp that moves an object from one to another is clear in both.
     """
-    chosen: list[int] = []
-    for column in clear.T:
-        _add_farthest(candidates, np.flatnonzero(column), count // (2 * clear.shape[1]), chosen)
-    _add_farthest(candidates, np.arange(len(candidates)), count - len(chosen), chosen)
-    index = np.array(chosen, int)
+    if len(candidates) == 0:
+        return np.empty(0, int)
+    groups = [
+        clear[:, i] & clear[:, j] for i in range(clear.shape[1]) for j in range(i, clear.shape[1])
+    ]
+    groups = sorted((g for g in groups if g.any()), key=np.count_nonzero)  # the scarcest first
+    choice = _FarthestChoice(candidates)
+    for number, group in enumerate(groups):
+        places = round(CLEAR_SHARE * count) - len(choice.chosen)
+        choice.extend(group, max(1, places // (len(groups) - number)), count)
+    choice.extend(np.ones(len(candidates), bool), count, count)
+    index = np.array(choice.chosen, int)
     return index[np.argsort(-candidates.quality[index], kind="stable")]
 
 
-def _add_farthest(
-    candidates: Candidates, allowed: Int[np.ndarray, "m"], extra: int, chosen: list[int]
-) -> None:
-    """Append up to `extra` of `allowed`: each time the best in quality times distance to the chosen."""
-    features = np.hstack([candidates.poses[:, :3, 3] / SPREAD, candidates.poses[:, :3, 2]])
-    quality = candidates.quality[allowed]
-    distance = np.ones(len(allowed))
+class _FarthestChoice:
+    """Grows a set of grasps, each time by the best in quality times distance to the chosen."""
 
-    def keep_away(k: int) -> None:
-        np.minimum(distance, np.linalg.norm(features[allowed] - features[k], axis=1), out=distance)
+    def __init__(self, candidates: Candidates) -> None:
+        poses = candidates.poses
+        closing = poses[:, :3, 1]
+        # y y^T is the same for both signs of y.
+        line = np.einsum("ni,nj->nij", closing, closing).reshape(-1, 9) / 2
+        features = [poses[:, :3, 3] / SPREAD, poses[:, :3, 2], line]
+        self._features = np.hstack(features).astype(np.float32)
+        self._score = candidates.quality.astype(np.float32)
+        self._distance = np.ones(len(candidates), np.float32)
+        self.chosen: list[int] = []
 
-    for k in chosen:
-        keep_away(k)
-    for _ in range(min(extra, len(allowed))):
-        best = int(np.argmax(distance * quality))
-        if distance[best] * quality[best] <= 0:
-            return
-        chosen.append(int(allowed[best]))
-        keep_away(chosen[-1])
+    def extend(self, allowed: Bool[np.ndarray, "n"], more: int, limit: int) -> None:
+        """Choose up to `more` from `allowed`, while there are fewer than `limit` in all."""
+        index = np.flatnonzero(allowed)
+        size = min(len(self.chosen) + more, limit)
+        while len(index) and len(self.chosen) < size:
+            value = (self._distance * self._score)[index]
+            best = int(index[np.argmax(value)])
+            if value.max() <= 0:
+                return
+            self.chosen.append(best)
+            away = np.linalg.norm(self._features - self._features[best], axis=1)
+            np.minimum(self._distance, away, out=self._distance)

@@ -5,25 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
-from jaxtyping import Float
 
-from asset_pipeline.antipodal import antipodal_pairs, first_in_cells, surface_points
+from asset_pipeline.antipodal import antipodal_pairs
 from asset_pipeline.assets import GraspSet, StablePose
-from asset_pipeline.geometry import Shape
+from asset_pipeline.geometry import Body
 from asset_pipeline.grasp_choice import clear_of_plane, diverse
 from asset_pipeline.grasp_fit import COARSE_CELL, Candidates, ObjectCloud, fit_pair
 from asset_pipeline.gripper import ParallelJaw
+from asset_pipeline.touch_points import first_in_cells, surface_points, union_points
 
-ENOUGH = 4000  # candidates to choose from
+ENOUGH = 3000  # candidates to choose from
+MAX_PAIRS = 800
 
 
 def sample_grasps(
-    surface: trimesh.Trimesh,
-    collision: Sequence[Shape],
+    body: Body,
     stable_poses: Sequence[StablePose],
     *,
-    center_of_mass: Float[np.ndarray, "3"] | None = None,
     gripper: ParallelJaw | None = None,
     seed: int = 0,
     count: int = 400,
@@ -36,10 +34,8 @@ def sample_grasps(
     for an arm adds those.
 
     Args:
-      surface: What is seen, in the object frame [m], normals outwards.
-      collision: What is touched, in the object frame.
+      body: The pads close on its collision shapes; the open hand avoids its looks as well.
       stable_poses: For `GraspSet.clear`, in this order.
-      center_of_mass: `(3,)` [m]; near it is better. None takes the surface's centroid.
       gripper: The hand; None takes the Franka hand's geometry.
       seed: Of the sampling; the same seed gives the same grasps.
       count: The most grasps to return.
@@ -49,24 +45,21 @@ def sample_grasps(
     """
     gripper = gripper or ParallelJaw()
     rng = np.random.default_rng(seed)
-    points, normals, spacing = surface_points(surface, rng)
-    touched = trimesh.util.concatenate([s.surface() for s in collision])
-    center = surface.centroid if center_of_mass is None else center_of_mass
-    obstacles = np.concatenate([points, surface_points(touched, rng)[0]])
+    touch = union_points(body.collision, rng)
+    obstacles = np.concatenate([touch.points, surface_points(body.surface(), rng).points])
     cloud = ObjectCloud(
-        points=points,
-        normals=normals,
-        spacing=spacing,
+        touch=touch,
         obstacles=obstacles,
         coarse=obstacles[first_in_cells(obstacles / COARSE_CELL)],
-        center_of_mass=np.asarray(center, float),
+        mass_properties=body.mass_properties,
     )
+    ups = [p.rotation[2] for p in stable_poses] or [np.array([0.0, 0.0, 1.0])]
     found: list[Candidates] = []
     total = 0
-    for i, j in antipodal_pairs(points, normals, spacing, gripper, rng):
-        found.append(fit_pair(cloud, i, j, gripper))
+    for number, (i, j) in enumerate(antipodal_pairs(touch, gripper, rng)):
+        found.append(fit_pair(cloud, i, j, gripper, ups[number % len(ups)]))
         total += len(found[-1])
-        if total >= ENOUGH:
+        if total >= ENOUGH or number + 1 == MAX_PAIRS:
             break
     candidates = Candidates.joined(found)
     clear = clear_of_plane(candidates.poses, candidates.widths, stable_poses, gripper)

@@ -25,6 +25,7 @@ class ParallelJaw:
       pad_half_height: Along z [m].
       clearance: How much further than the object each pad is open on approach, where it can be [m].
       min_clearance: The least `opening - width` a grasp needs [m].
+      grip_force: Of each pad [N]: the Franka hand data sheet's continuous force.
       finger: The finger's boxes: pad, fingertip, middle, base.
       hand: The boxes that do not move: body, flange, cable plug and the wrist that carries the hand.
         Plug and wrist are one-sided on the robot; here they are on both, as a grasp stands for its
@@ -36,6 +37,7 @@ class ParallelJaw:
     pad_half_height: float = 0.009
     clearance: float = 0.006
     min_clearance: float = 0.003
+    grip_force: float = 70.0
     finger: tuple[Box, ...] = (
         ((-0.0088, 0.0, -0.009), (0.0088, 0.003, 0.009)),
         ((-0.0088, 0.003, -0.009), (0.0088, 0.0145, 0.009)),
@@ -46,8 +48,8 @@ class ParallelJaw:
         ((-0.0205, -0.1025, -0.1114), (0.0205, 0.1025, -0.0374)),
         ((-0.0315, -0.036, -0.1114), (0.0315, 0.036, -0.0914)),
         ((-0.007, -0.104, -0.1294), (0.007, 0.104, -0.1114)),
-        ((-0.045, -0.045, -0.1760), (0.045, 0.045, -0.1114)),
-        ((-0.032, -0.1010, -0.1610), (0.032, 0.1010, -0.1114)),
+        ((-0.045, -0.045, -0.1774), (0.045, 0.045, -0.0854)),
+        ((-0.0311, -0.1010, -0.1614), (0.0311, 0.1010, -0.0964)),
     )
 
     def opening(self, width: float | Float[np.ndarray, "*n"]) -> np.ndarray:

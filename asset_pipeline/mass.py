@@ -1,8 +1,9 @@
 """Mass, centre of mass and inertia of solids, thin shells and unions of convex shapes.
 
-Everything goes through the second moments `integral of (x - c)(x - c)^T dm`, from which the inertia
-is `trace(S) 1 - S`. A symmetric `S` with no negative eigenvalue is the same thing as an inertia that
-is positive and obeys the triangle inequality MuJoCo asks for, so that is where both are ensured.
+Everything goes through the second moments `S = integral of (x - c)(x - c)^T dm`, from which the
+inertia is `trace(S) 1 - S`. A symmetric `S` with no negative eigenvalue is the same thing as an
+inertia that is positive and obeys the triangle inequality MuJoCo asks for, so that is where both
+are ensured.
 """
 
 from __future__ import annotations

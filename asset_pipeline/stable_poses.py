@@ -23,6 +23,7 @@ from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotat
 MIN_PROBABILITY = 0.01
 # Facets of a curved side are nearer to each other than this; faces of a box are not.
 MERGE_ANGLE = np.deg2rad(12.0)
+MIN_DEPTH = 1e-9  # of the centre of mass in the hull; on its face nothing is stable [m]
 MAX_TILT = np.deg2rad(5.0)
 SETTLE_TIME = 1.5
 TIMESTEP = 0.002
@@ -38,8 +39,8 @@ def stable_poses(
 
     Poses that differ by a turn about the vertical, by a symmetry of the label or by the facets of
     one curved side are one pose; the most probable of them stands for all and gets their sum. Those
-    under 1 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose statistics"
-    (IEEE T-RA 1999), computed by trimesh.
+    under 1 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose
+    statistics" (IEEE T-RA 1999), computed by trimesh.
 
     Args:
       surface: What touches the plane, in the object frame [m].
@@ -52,7 +53,7 @@ def stable_poses(
     hull = _hull(surface)
     center = np.asarray(center_of_mass, float)
     inside = np.einsum("fi,fi->f", hull.triangles_center - center, hull.face_normals)
-    if inside.min() <= 0:
+    if inside.min() < MIN_DEPTH:
         raise InputError(
             f"centre of mass {np.round(center, 4).tolist()} lies outside the object's convex hull"
         )
@@ -91,7 +92,7 @@ def verified(
 def tilt(
     a: Float[np.ndarray, "3 3"], b: Float[np.ndarray, "3 3"], label: PoseLabel | None
 ) -> float:
-    """Angle [rad] between the ups of two rest rotations `R_world_object`, least over the symmetries."""
+    """Angle [rad] between two rest rotations `R_world_object`, least over symmetries and yaw."""
     group = SymmetryGroup.identity() if label is None else label.symmetry
     frame = np.eye(3) if label is None else label.rotation
     up_a, up_b = a[2] @ frame, b[2] @ frame

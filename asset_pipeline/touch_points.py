@@ -27,20 +27,16 @@ class SurfacePoints:
     spacing: float
 
 
-def surface_points(
-    mesh: trimesh.Trimesh, rng: np.random.Generator, spacing: float | None = None
-) -> SurfacePoints:
+def surface_points(mesh: trimesh.Trimesh, rng: np.random.Generator) -> SurfacePoints:
     """Area-weighted random points, thinned to one for each cell of a grid and side of a wall.
 
     Args:
       mesh: The surface, normals outwards [m].
       rng: Draws the points.
-      spacing: Side of a cell [m]; None takes 3 mm, or more for an area of over 8000 such cells.
     """
-    if spacing is None:
-        spacing = max(MIN_SPACING, float(np.sqrt(mesh.area / MAX_POINTS)))
+    spacing = max(MIN_SPACING, float(np.sqrt(mesh.area / MAX_POINTS)))
     count = int(4 * mesh.area / spacing**2) + 100
-    corners, faces_normals = np.asarray(mesh.triangles), np.asarray(mesh.face_normals)
+    corners, face_normals = np.asarray(mesh.triangles), np.asarray(mesh.face_normals)
     areas = np.asarray(mesh.area_faces)
     faces = rng.choice(len(areas), size=count, p=areas / areas.sum())
     u, v = rng.random((2, count, 1))
@@ -48,7 +44,7 @@ def surface_points(
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     a, b, c = corners[faces].transpose(1, 0, 2)
     points = a + u * (b - a) + v * (c - a)
-    normals = faces_normals[faces]
+    normals = face_normals[faces]
     # Both sides of a thin wall may fall into one cell; their rounded normals tell them apart.
     first = first_in_cells(np.hstack([points / spacing, normals + 0.5]))
     return SurfacePoints(points[first], normals[first], spacing)
@@ -67,7 +63,9 @@ def union_points(shapes: Sequence[Shape], rng: np.random.Generator) -> SurfacePo
         return cloud
     outside = np.ones(len(cloud.points), bool)
     for mesh in meshes:
-        near = (cloud.points > mesh.bounds[0]).all(axis=1) & (cloud.points < mesh.bounds[1]).all(axis=1)
+        near = (cloud.points > mesh.bounds[0]).all(axis=1) & (cloud.points < mesh.bounds[1]).all(
+            axis=1
+        )
         index = np.flatnonzero(near & outside)
         normals = np.asarray(mesh.face_normals)
         levels = np.einsum("fi,fi->f", normals, np.asarray(mesh.triangles)[:, 0])

@@ -51,7 +51,9 @@ def row(asset: Asset) -> np.ndarray:
         views = ((150.0, 0.0, VISUAL_GROUP), (215.0, 0.0, VISUAL_GROUP))
         views += ((155.0, 1.0, VISUAL_GROUP), (155.0, 1.0, COLLISION_GROUP))
     else:
-        views = tuple((a, 0.0, VISUAL_GROUP) for a in (35.0, 100.0)) + ((35.0, 0.0, COLLISION_GROUP),)
+        views = tuple((a, 0.0, VISUAL_GROUP) for a in (35.0, 100.0)) + (
+            (35.0, 0.0, COLLISION_GROUP),
+        )
     model = stage(asset)
     data = mujoco.MjData(model)
     pictures = []
@@ -69,11 +71,18 @@ def stage(asset: Asset) -> mujoco.MjModel:
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.35, 0.35, 0.35]
     spec.visual.headlight.specular = [0.05, 0.05, 0.05]
-    spec.visual.quality.shadowsize = 2048
+    spec.visual.quality.shadowsize = 4096
     spec.visual.map.znear = 0.01
-    spec.visual.rgba.haze = [0.93, 0.94, 0.95, 1]
-    spec.worldbody.add_light(pos=[-size, 1.5 * size, 3 * size], dir=[0.3, -0.45, -0.9])
-    floor = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
+    spec.visual.map.shadowclip = 2.0
+    for direction, strength, shadow in (
+        ((0.35, -0.5, -0.9), 0.45, True),
+        ((0.3, 0.6, -0.5), 0.2, False),
+    ):
+        light = spec.worldbody.add_light(pos=[0, 0, 3 * size], dir=direction, castshadow=shadow)
+        light.type, light.diffuse = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, [strength] * 3
+    floor = spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[60 * size, 60 * size, 0.1]
+    )
     floor.pos, floor.rgba, floor.group = [0, 0, lowest], [0.82, 0.83, 0.84, 1], 0
     floor.contype = floor.conaffinity = 0
     base = spec.worldbody.bodies[0]
@@ -108,7 +117,7 @@ def picture(
     mujoco.mj_forward(model, data)
     camera = mujoco.MjvCamera()
     camera.lookat = asset.label.origin - [0.3 * opening * asset.label.extents[1], 0.0, 0.0]
-    camera.distance = (1.75 + 0.6 * opening) * float(np.linalg.norm(asset.label.extents))
+    camera.distance = (1.55 + 0.45 * opening) * float(np.linalg.norm(asset.label.extents))
     # The free camera looks along its azimuth: half a turn from where it stands.
     camera.azimuth, camera.elevation = azimuth + 180.0, ELEVATION
     option = mujoco.MjvOption()

@@ -22,7 +22,6 @@ from asset_pipeline.assets import Asset, list_assets, read_asset
 from asset_pipeline.gripper import ParallelJaw
 from manipose_mj.poses import invert, pose_to_vector, quaternion_to_rotation, rotation_angle
 
-GRIP_FORCE = 70.0  # [N], on each pad: Franka hand data sheet, continuous
 # Contact, damping [N s/m] and reflected mass [kg] as in `manipose_mj.mjcf.panda_model`.
 PAD_FRICTION = (1.0, 0.005, 0.0001)
 PAD_SOLREF, PAD_SOLIMP = (0.005, 1.0), (0.95, 0.99, 0.001, 0.5, 2.0)
@@ -91,7 +90,7 @@ def _hold_one(
     up = start[:3, :3] @ up_object
     data.qpos[thing] = pose_to_vector(start)
     data.qpos[fingers] = float(gripper.opening(width)) / 2
-    data.ctrl[3:5] = -GRIP_FORCE
+    data.ctrl[3:5] = -gripper.grip_force
     model.opt.gravity[:] = 0
     mujoco.mj_step(model, data, round(CLOSE_TIME / TIMESTEP))
     closed = data.qpos[thing].copy()
@@ -147,7 +146,10 @@ def _model(path: Path, gripper: ParallelJaw) -> mujoco.MjModel:
         for low, high in np.sort(np.array(gripper.finger) * [sign, sign, 1], axis=1):
             _add_box(finger, low, high, mass=0.02)
     fingers = spec.add_equality(
-        type=mujoco.mjtEq.mjEQ_JOINT, name1="finger_left", name2="finger_right", objtype=mujoco.mjtObj.mjOBJ_JOINT
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        name1="finger_left",
+        name2="finger_right",
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
     )
     fingers.data[:2] = (0.0, 1.0)
     fingers.solref = (0.005, 1.0)
@@ -155,9 +157,7 @@ def _model(path: Path, gripper: ParallelJaw) -> mujoco.MjModel:
         servo = spec.add_actuator(target=f"hand_{axis}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=40000.0, dampratio=1.0)
     for side in ("left", "right"):
-        spec.add_actuator(
-            target=f"finger_{side}", trntype=mujoco.mjtTrn.mjTRN_JOINT
-        ).set_to_motor()
+        spec.add_actuator(target=f"finger_{side}", trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
     return spec.compile()
 
 

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from asset_pipeline.geometry import Body, MassProperties, Shape
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass, wall_wedges
-from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 STONEWARE = 2300.0  # [kg/m^3]
@@ -60,7 +60,7 @@ def design(index: int) -> Bowl:
         return Bowl()
     rng = specimen_rng("bowl", index)
     diameter = rng.uniform(0.120, 0.170)
-    outside, inside, rim = pick(rng, _GLAZES)
+    outside, inside, rim = in_turn(index, _GLAZES)
     return Bowl(
         diameter=round(float(diameter), 4),
         height=round(float(np.clip(diameter * rng.uniform(0.36, 0.50), 0.045, 0.075)), 4),

@@ -22,7 +22,7 @@ from asset_pipeline.procedural.solids import (
     rounded_box_bands,
     rounded_rectangle,
 )
-from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 CARDBOARD = 700.0  # [kg/m^3]
@@ -60,7 +60,7 @@ _KINDS: tuple[tuple[tuple[float, float], tuple[float, float], tuple[float, float
 )
 _PRINTS: tuple[tuple[Colour, Colour, Colour], ...] = (
     ((0.15, 0.42, 0.30, 1.0), (0.95, 0.90, 0.72, 1.0), (0.55, 0.28, 0.12, 1.0)),
-    ((0.95, 0.94, 0.90, 1.0), (0.16, 0.40, 0.68, 1.0), (0.80, 0.16, 0.16, 1.0)),
+    ((0.45, 0.68, 0.82, 1.0), (0.14, 0.30, 0.56, 1.0), (0.80, 0.16, 0.16, 1.0)),
     ((0.97, 0.76, 0.16, 1.0), (0.80, 0.25, 0.10, 1.0), (0.35, 0.18, 0.10, 1.0)),
     ((0.93, 0.48, 0.12, 1.0), (0.98, 0.93, 0.80, 1.0), (0.20, 0.45, 0.20, 1.0)),
     ((0.30, 0.20, 0.45, 1.0), (0.85, 0.78, 0.92, 1.0), (0.93, 0.72, 0.20, 1.0)),
@@ -76,7 +76,7 @@ def design(index: int) -> Carton:
     d, w, h = (round(float(rng.uniform(*r)), 4) for r in (depth, width, height))
     if depth == width:
         w = d
-    body, band, ink = pick(rng, _PRINTS)
+    body, band, ink = in_turn(index, _PRINTS)
     return Carton(d, w, h, content, body, band, ink)
 
 
@@ -137,7 +137,7 @@ def _looks(carton: Carton, square: bool) -> tuple[Shape, ...]:
         label = 0.70 * oval[0], 0.26 * oval[1]
         outlines = (
             (rounded_rectangle(panel, 0.12 * min(panel)), WHITE),
-            (ellipse(oval), carton.band),
+            (ellipse(oval), carton.body),
             (rounded_rectangle(label, 0.3 * min(label)), carton.ink),
         )
         for layer, (outline, rgba) in enumerate(outlines, start=1):

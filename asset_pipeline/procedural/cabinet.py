@@ -22,7 +22,7 @@ from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.mass import shape_mass_properties
 from asset_pipeline.procedural.bar_handle import BarHandle, bar_handle
 from asset_pipeline.procedural.solids import box, rounded_box
-from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 WOOD = 680.0  # [kg/m^3], between particle board and beech
@@ -47,7 +47,7 @@ class Cabinet:
       handle: On every front; wood, front_rgba, inside: colours.
     """
 
-    depth: float = 0.320
+    depth: float = 0.400
     height: float = 0.420
     drawer_column: float = 0.380
     door_column: float = 0.260
@@ -56,8 +56,8 @@ class Cabinet:
     gap: float = 0.003
     wall: float = 0.007
     wall_height: float = 0.055
-    inner_depth: float = 0.242
-    travel: float = 0.250
+    inner_depth: float = 0.340
+    travel: float = 0.320
     swing: float = radians(110)
     drawer_friction: float = 2.0
     drawer_damping: float = 8.0
@@ -86,11 +86,36 @@ class Cabinet:
 
 
 _WOODS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
-    ((0.93, 0.92, 0.90, 1.0), (0.80, 0.84, 0.86, 1.0), (0.95, 0.94, 0.92, 1.0), (0.20, 0.20, 0.21, 1.0)),
-    ((0.50, 0.34, 0.22, 1.0), (0.58, 0.40, 0.26, 1.0), (0.70, 0.55, 0.39, 1.0), (0.12, 0.11, 0.10, 1.0)),
-    ((0.85, 0.76, 0.62, 1.0), (0.42, 0.55, 0.48, 1.0), (0.90, 0.84, 0.73, 1.0), (0.17, 0.16, 0.15, 1.0)),
-    ((0.78, 0.62, 0.43, 1.0), (0.90, 0.88, 0.83, 1.0), (0.86, 0.75, 0.58, 1.0), (0.25, 0.23, 0.22, 1.0)),
-    ((0.88, 0.78, 0.60, 1.0), (0.30, 0.38, 0.50, 1.0), (0.92, 0.85, 0.72, 1.0), (0.14, 0.14, 0.16, 1.0)),
+    (
+        (0.93, 0.92, 0.90, 1.0),
+        (0.80, 0.84, 0.86, 1.0),
+        (0.95, 0.94, 0.92, 1.0),
+        (0.20, 0.20, 0.21, 1.0),
+    ),
+    (
+        (0.50, 0.34, 0.22, 1.0),
+        (0.58, 0.40, 0.26, 1.0),
+        (0.70, 0.55, 0.39, 1.0),
+        (0.12, 0.11, 0.10, 1.0),
+    ),
+    (
+        (0.85, 0.76, 0.62, 1.0),
+        (0.42, 0.55, 0.48, 1.0),
+        (0.90, 0.84, 0.73, 1.0),
+        (0.17, 0.16, 0.15, 1.0),
+    ),
+    (
+        (0.78, 0.62, 0.43, 1.0),
+        (0.90, 0.88, 0.83, 1.0),
+        (0.86, 0.75, 0.58, 1.0),
+        (0.25, 0.23, 0.22, 1.0),
+    ),
+    (
+        (0.88, 0.78, 0.60, 1.0),
+        (0.30, 0.38, 0.50, 1.0),
+        (0.92, 0.85, 0.72, 1.0),
+        (0.14, 0.14, 0.16, 1.0),
+    ),
 )
 
 
@@ -99,7 +124,7 @@ def design(index: int) -> Cabinet:
     if index == 0:
         return Cabinet()
     rng = specimen_rng("cabinet", index)
-    wood, front, inside, metal = pick(rng, _WOODS)
+    wood, front, inside, metal = in_turn(index, _WOODS)
     standard = Cabinet()
     return replace(
         standard,
@@ -107,8 +132,8 @@ def design(index: int) -> Cabinet:
         drawer_column=round(float(rng.uniform(0.345, 0.390)), 3),
         door_column=round(float(rng.uniform(0.230, 0.280)), 3),
         wall_height=round(float(rng.uniform(0.050, 0.060)), 3),
-        inner_depth=round(float(rng.uniform(0.240, 0.250)), 3),
-        travel=round(float(rng.uniform(0.240, 0.250)), 3),
+        inner_depth=round(float(rng.uniform(0.335, 0.345)), 3),
+        travel=round(float(rng.uniform(0.315, 0.325)), 3),
         drawer_friction=round(float(rng.uniform(1.5, 3.0)), 2),
         drawer_damping=round(float(rng.uniform(5.0, 10.0)), 1),
         handle=BarHandle(
@@ -151,7 +176,10 @@ def _carcass(c: Cabinet) -> Body:
         ((-x, y - t, t), (x, y, c.height - t)),
     ]
     shelves = [
-        ((-x, -y + t, c.opening_heights(row)[1]), (x - t, c.split - t / 2, c.opening_heights(row)[1] + t))
+        (
+            (-x, -y + t, c.opening_heights(row)[1]),
+            (x - t, c.split - t / 2, c.opening_heights(row)[1] + t),
+        )
         for row in range(2)
     ]
     backs = [

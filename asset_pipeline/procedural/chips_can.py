@@ -16,7 +16,7 @@ from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.mass import combine
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass
 from asset_pipeline.procedural.solids import ellipse, print_on_cylinder
-from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 YCB_MASS = 0.205  # [kg], with its chips
@@ -46,7 +46,6 @@ class ChipsCan:
 
 
 _FLAVOURS: tuple[tuple[Colour, Colour, Colour], ...] = (
-    ((0.80, 0.07, 0.09, 1.0), (0.98, 0.79, 0.15, 1.0), (0.93, 0.93, 0.91, 1.0)),
     ((0.10, 0.45, 0.22, 1.0), (0.93, 0.90, 0.72, 1.0), (0.16, 0.42, 0.25, 1.0)),
     ((0.10, 0.25, 0.62, 1.0), (0.88, 0.89, 0.93, 1.0), (0.90, 0.91, 0.93, 1.0)),
     ((0.93, 0.52, 0.08, 1.0), (0.60, 0.10, 0.08, 1.0), (0.93, 0.93, 0.91, 1.0)),
@@ -59,7 +58,7 @@ def design(index: int) -> ChipsCan:
     if index == 0:
         return ChipsCan()
     rng = specimen_rng("chips_can", index)
-    body, band, lid = pick(rng, _FLAVOURS)
+    body, band, lid = in_turn(index, _FLAVOURS)
     return ChipsCan(
         diameter=round(float(rng.uniform(0.066, 0.076)), 4),
         height=round(float(rng.uniform(0.150, 0.255)), 3),
@@ -115,9 +114,7 @@ def _looks(can: ChipsCan) -> tuple[Shape, ...]:
     emblem = ellipse((0.62 * r, 0.72 * r))
     for angle in (0.0, np.pi):
         for layer, (scale, rgba) in enumerate(((1.0, CREAM), (0.86, can.band)), start=1):
-            mesh = print_on_cylinder(
-                scale * emblem, tube, angle=angle, height=middle, layer=layer
-            )
+            mesh = print_on_cylinder(scale * emblem, tube, angle=angle, height=middle, layer=layer)
             shapes.append(Shape("mesh", mesh=mesh, rgba=rgba))
     return tuple(shapes)
 
@@ -131,9 +128,7 @@ def _mass(can: ChipsCan) -> MassProperties:
     empty, chips = _packaging_and_content(can)
     _, reference = _packaging_and_content(ChipsCan())
     density = (YCB_MASS - _packaging_and_content(ChipsCan())[0].mass) / reference.mass
-    content = MassProperties(
-        chips.mass * density, chips.center_of_mass, chips.inertia * density
-    )
+    content = MassProperties(chips.mass * density, chips.center_of_mass, chips.inertia * density)
     return combine([empty, content])
 
 

@@ -24,7 +24,7 @@ from asset_pipeline.procedural.revolution import (
     wall_wedges,
 )
 from asset_pipeline.procedural.solids import loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, pick, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 STONEWARE = 2300.0  # [kg/m^3]
@@ -80,9 +80,9 @@ def design(index: int) -> Mug:
         return Mug()
     rng = specimen_rng("mug", index)
     widest = rng.uniform(0.075, 0.078) if index % 3 == 1 else rng.uniform(0.078, 0.095)
-    taper = pick(rng, (0.0, 0.0, 0.004, 0.010, -0.004))
+    taper = float(rng.choice((0.0, 0.0, 0.004, 0.010, -0.004)))
     height = rng.uniform(0.080, 0.110)
-    glaze, stripe, inside = _GLAZES[(index - 1) % len(_GLAZES)]
+    glaze, stripe, inside = in_turn(index, _GLAZES)
     return Mug(
         foot=round(float(widest - max(taper, 0.0)), 4),
         rim=round(float(widest + min(taper, 0.0)), 4),
@@ -205,9 +205,7 @@ def _collision(mug: Mug, sections: np.ndarray) -> list[Shape]:
     return shapes
 
 
-def _looks(
-    mug: Mug, section: tuple[np.ndarray, np.ndarray], sections: np.ndarray
-) -> list[Shape]:
+def _looks(mug: Mug, section: tuple[np.ndarray, np.ndarray], sections: np.ndarray) -> list[Shape]:
     outer, inner = section
     low, high = 0.70 * mug.height, 0.86 * mug.height
     if mug.stripe is None:

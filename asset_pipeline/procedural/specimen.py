@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from asset_pipeline.assets import MovingPart
 from asset_pipeline.geometry import Body
 from asset_pipeline.labelling.label import PoseLabel
 
+_Choice = TypeVar("_Choice")
 Colour = tuple[float, float, float, float]
 
 
@@ -34,6 +36,6 @@ def specimen_rng(category: str, index: int) -> np.random.Generator:
     return np.random.default_rng([zlib.crc32(category.encode()), index])
 
 
-def pick(rng: np.random.Generator, choices: tuple) -> tuple:
-    """One of a few alternatives."""
-    return choices[int(rng.integers(len(choices)))]
+def in_turn(index: int, choices: tuple[_Choice, ...]) -> _Choice:
+    """The colours of instance `index`, so that neighbours differ; instance 0 has its own."""
+    return choices[(index - 1) % len(choices)]

@@ -1,4 +1,4 @@
-"""`manipose assets list`: what is in a folder of assets, or built in."""
+"""`manipose assets list`: what is in a folder of assets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def list_objects(
-    directory: Annotated[Positional[Path | None], arg(metavar="DIR")] = None,
+    directory: Annotated[Positional[Path], arg(metavar="DIR")],
     /,
     *,
     json: bool = False,
@@ -22,18 +22,13 @@ def list_objects(
     """List assets with their category, type, mass, stable poses and grasps.
 
     Args:
-      directory: Folder of assets; the built-in objects without it.
+      directory: Folder of assets.
       json: Print JSON, for other programs.
     """
     from asset_pipeline.assets import list_assets, read_asset
     from manipose_mj.cli import output
-    from manipose_mj.cli.builtin_objects import all_names, load_objects
 
-    if directory is None:
-        assets = load_objects(all_names(), CORES)
-    else:
-        assets = [read_asset(folder) for folder in list_assets(directory)]
-    rows = [summary(asset) for asset in assets]
+    rows = [summary(read_asset(folder)) for folder in list_assets(directory)]
     if json:
         output.write_json(rows)
         return

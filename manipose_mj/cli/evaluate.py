@@ -13,17 +13,19 @@ from manipose_mj.errors import InputError, unknown_name
 
 
 def evaluate(
-    tasks: Annotated[Positional[tuple[str, ...]], arg(metavar="TASK...")],
+    tasks: Annotated[Positional[tuple[str, ...]], arg(metavar="TASK...", help_behavior_hint="")],
     /,
     *,
     episodes: int = 50,
     seed: int = 0,
     pose: Literal["oracle"] = "oracle",
     jobs: int = CORES,
-    out: Annotated[Path | None, arg(metavar="DIR")] = None,
-    resume: bool = False,
-    assets: Annotated[Path | None, arg(metavar="DIR")] = None,
-    object_name: Annotated[str | None, arg(name="object", metavar="NAME")] = None,
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    resume: Annotated[bool, arg(help_behavior_hint="")] = False,
+    assets: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    object_name: Annotated[
+        str | None, arg(name="object", metavar="NAME", help_behavior_hint="")
+    ] = None,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
 
@@ -32,7 +34,7 @@ def evaluate(
       episodes: Episodes per task.
       seed: Base seed; each episode derives its own from it.
       pose: Where the baseline takes object poses from.
-      jobs: Episodes at the same time, one core each. Results do not depend on it.
+      jobs: Episodes at the same time, one core each; results do not depend on it.
       out: Folder for the results; by default a new one under manipose_results.
       resume: Go on with the results in --out after an interruption.
       assets: Folder of built assets to take objects from instead of the built-in ones.

@@ -102,25 +102,20 @@ def fail_line(message: str) -> None:
 
 def summary_table(summary: dict[str, dict[str, Any]]) -> Table:
     """The tasks of a `summary.json`, one row each."""
-    table = Table("task", title_justify="left")
-    for name in ("episodes", "at end", "95 % interval", "once", "cm", "deg", "median s"):
+    table = Table()
+    # Names fold rather than vanish in a narrow window.
+    table.add_column("task", overflow="fold", min_width=24)
+    for name in ("at end", "95 %", "once", "wall s"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("failures")
+    table.add_column("failures", overflow="fold", min_width=10)
     for task, row in summary.items():
         low, high = row["wilson_95"]
         table.add_row(
             task,
-            str(row["episodes"]),
-            str(row["success_at_end"]),
+            f"{row['success_at_end']}/{row['episodes']}",
             f"{100 * low:.0f}-{100 * high:.0f} %",
             str(row["success_once"]),
-            _scaled(row["median_translation_error_m"], 100, 2),
-            _scaled(row["median_rotation_error_rad"], 57.29578, 1),
             f"{row['median_wall_s']:.1f}",
             ", ".join(f"{stage} {n}" for stage, n in row["failures"].items()) or "none",
         )
     return table
-
-
-def _scaled(value: float | None, factor: float, digits: int) -> str:
-    return "-" if value is None else f"{factor * value:.{digits}f}"

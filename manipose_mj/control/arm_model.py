@@ -71,7 +71,12 @@ class ArmModel:
             inverse_position, inverse_quaternion = np.zeros(3), np.zeros(4)
             mujoco.mju_negPose(inverse_position, inverse_quaternion, above.xpos, above.xquat)
             mujoco.mju_mulPose(
-                position, quaternion, inverse_position, inverse_quaternion, source.xpos, source.xquat
+                position,
+                quaternion,
+                inverse_position,
+                inverse_quaternion,
+                source.xpos,
+                source.xquat,
             )
             self.model.body_pos[body] = position
             self.model.body_quat[body] = quaternion

@@ -121,9 +121,7 @@ def solve(
         pose, jacobian = forward(q[active])
         error = np.empty((len(active), 6))
         error[:, :3] = goal[active, :3, 3] - pose[:, :3, 3]
-        error[:, 3:] = rotation_vector(
-            goal[active, :3, :3] @ pose[:, :3, :3].transpose(0, 2, 1)
-        )
+        error[:, 3:] = rotation_vector(goal[active, :3, :3] @ pose[:, :3, :3].transpose(0, 2, 1))
         reached = (np.linalg.norm(error[:, :3], axis=1) < config.position_tolerance) & (
             np.linalg.norm(error[:, 3:], axis=1) < config.rotation_tolerance
         )

@@ -56,6 +56,7 @@ class PartBelief:
       cavity: What it gives access to, in the object frame.
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
+      contents: Bodies of the objects in its cavity, which move with a drawer.
     """
 
     name: str
@@ -67,6 +68,7 @@ class PartBelief:
     cavity: Cavity | None
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
+    contents: tuple[int, ...] = ()
 
     @property
     def handle_pose(self) -> Float[np.ndarray, "4 4"]:

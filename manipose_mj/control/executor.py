@@ -12,7 +12,7 @@ from manipose_mj.control.belief import Belief, Senses
 Action = Float[np.ndarray, "8"]
 Actions = Iterator[Action]
 
-_CONVERGED = 0.003  # of every joint to its target [rad]
+_CONVERGED = 0.0015  # of every joint to its target [rad]
 _MAX_SETTLE = 0.6  # [s]
 _STILL = 2e-4  # change of the opening in a control step that counts as none [m]
 _MAX_CLOSING = 1.6  # [s]; the fingers need 0.8 for their whole stroke

@@ -26,7 +26,7 @@ class FreeMotionConfig:
     step: float = 0.35
     resolution: float = 0.04
     max_nodes: int = 1500
-    shortcuts: int = 40
+    shortcuts: int = 80
 
 
 def plan_path(

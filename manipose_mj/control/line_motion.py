@@ -29,7 +29,7 @@ class LineConfig:
     settle_steps: int = 12
     end_position: float = 7e-4
     end_rotation: float = 4e-3
-    clearance: float = 0.001
+    clearance: float = 0.003
     detection: float = 0.02
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,17 +14,33 @@ from manipose_mj.control.belief import ObjectBelief, PartBelief
 from manipose_mj.control.free_motion import plan_path
 from manipose_mj.control.grasp_candidates import reachable
 from manipose_mj.control.line_motion import LineConfig, line_poses, track
-from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, Clearance, PlanningScene
+from manipose_mj.control.planning_scene import (
+    CONTACT,
+    ROUNDED,
+    TRANSIT,
+    Carried,
+    Clearance,
+    PlanningScene,
+)
 from manipose_mj.control.trajectory import Timing, timed
-from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about
+from manipose_mj.poses import (
+    SymmetryGroup,
+    compose,
+    invert,
+    pose_to_vector,
+    rotation_about,
+    vector_to_pose,
+)
 
 # Heights from which an object is lowered to its place, best first [m].
 _DESCENTS = (0.10, 0.06, 0.03)
 # How far to back off after letting go, best first [m]; the last must do.
 RETREATS = (0.12, 0.09, 0.06)
+HANDLE_RETREATS = (0.10, 0.07, 0.045)
 _MAX_PLACES = 8
 # Of every so many control steps one is checked for collision.
 _CHECK_EVERY = 4
+_SPEED_SHARES = (1.0, 0.5, 0.25, 0.1)
 
 
 @dataclass(frozen=True)
@@ -90,7 +108,16 @@ class MotionPlanner:
         """Joint targets from rest to rest through free space; None if no path was found."""
         with self.scene.query(clearance=TRANSIT, carried=carried) as scene:
             path = plan_path(start, goal, scene.in_collision, self._rng)
-        return None if path is None else timed(path, self._timestep, self._timing)
+        if path is None:
+            return None
+        # Rounding the corners leaves the path that was checked; slower leaves it less.
+        with self.scene.query(clearance=ROUNDED, carried=carried) as scene:
+            for share in _SPEED_SHARES:
+                timing = replace(self._timing, speed=share * self._timing.speed)
+                targets = timed(path, self._timestep, timing)
+                if not any(scene.in_collision(q) for q in targets[::_CHECK_EVERY]):
+                    return targets
+        return None
 
     def line(
         self,
@@ -166,6 +193,27 @@ class MotionPlanner:
                 return Place(ascent[-1], np.concatenate([ascent[::-1], joints[None]]))
         return None
 
+    @contextmanager
+    def part_at(self, part: PartBelief, opening: float) -> Iterator[None]:
+        """Ask with the part, and what is in it, at another opening [m or rad]."""
+        qpos = self.scene.data.qpos
+        saved = qpos.copy()
+        qpos[self._joint_address(part.body)] = opening
+        moved = joint_motion(part, opening) @ invert(joint_motion(part, part.opening))
+        motion = part.base_pose @ moved @ invert(part.base_pose)
+        for body in part.contents:
+            address = self._joint_address(body)
+            pose = vector_to_pose(saved[address : address + 7])
+            qpos[address : address + 7] = pose_to_vector(motion @ pose)
+        try:
+            yield
+        finally:
+            qpos[:] = saved
+
+    def _joint_address(self, body: int) -> int:
+        """Where in `qpos` the joint of a body begins."""
+        return int(self.scene.model.jnt_qposadr[self.scene.model.body_jntadr[body]])
+
     def part_path(
         self, joints: Float[np.ndarray, "7"], part: PartBelief, opening: float
     ) -> Float[np.ndarray, "t 7"] | None:
@@ -182,7 +230,10 @@ class MotionPlanner:
         share = line_poses(*ends, self._timestep, self._line)[:, 0, 3] / max(travel * radius, 1e-9)
         openings = part.opening + share * (opening - part.opening)
         poses = np.stack(
-            [part.base_pose @ joint_motion(part, q) @ part.handle.pose @ handle_tcp for q in openings]
+            [
+                part.base_pose @ joint_motion(part, q) @ part.handle.pose @ handle_tcp
+                for q in openings
+            ]
         )
         self._arm.follow(self.scene)
         touched = frozenset({self.body_name(part.body)})
@@ -191,12 +242,11 @@ class MotionPlanner:
         )
         if targets is None:
             return None
-        address = int(self.scene.model.jnt_qposadr[self.scene.model.body_jntadr[part.body]])
         with self.scene.query(clearance=CONTACT, target=part.geoms) as scene:
             for q, value in list(zip(targets, openings, strict=False))[::_CHECK_EVERY]:
-                scene.data.qpos[address] = value
-                if scene.in_collision(q):
-                    return None
+                with self.part_at(part, value):
+                    if scene.in_collision(q):
+                        return None
         return targets
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import Float
 
-from asset_pipeline.assets import GraspSet
+from asset_pipeline.assets import GraspSet, MovingPart
 from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
 from manipose_mj.control.planning_scene import PlanningScene, subtree_geoms
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
@@ -16,9 +16,7 @@ from manipose_mj.tasks.base import ManipulationTask
 class OracleSenses:
     """Beliefs that are true; for `pose="oracle"` only."""
 
-    def __init__(
-        self, task: ManipulationTask, physics: mjcf.Physics, scene: PlanningScene
-    ) -> None:
+    def __init__(self, task: ManipulationTask, physics: mjcf.Physics, scene: PlanningScene) -> None:
         self._task = task
         self._physics = physics
         self._scene = scene
@@ -36,7 +34,7 @@ class OracleSenses:
         parts = {
             part.name: part
             for furniture in self._task.furnishings
-            for part in self._parts(furniture)
+            for part in self._parts(furniture, objects)
         }
         return Belief(joints, opening, objects, parts)
 
@@ -54,7 +52,9 @@ class OracleSenses:
             geoms=subtree_geoms(self._scene.model, body),
         )
 
-    def _parts(self, furniture: ArticulatedObject) -> list[PartBelief]:
+    def _parts(
+        self, furniture: ArticulatedObject, objects: dict[str, ObjectBelief]
+    ) -> list[PartBelief]:
         found = []
         for part in furniture.asset.parts:
             if part.handle is None:
@@ -72,6 +72,21 @@ class OracleSenses:
                     cavity=part.cavity,
                     body=body,
                     geoms=subtree_geoms(self._scene.model, body),
+                    contents=self._contents(furniture, part, objects),
                 )
             )
         return found
+
+    def _contents(
+        self, furniture: ArticulatedObject, part: MovingPart, objects: dict[str, ObjectBelief]
+    ) -> tuple[int, ...]:
+        """Bodies of the objects whose label origin lies in a drawer's cavity."""
+        if part.cavity is None or not part.cavity.moves_with_part:
+            return ()
+        inside = []
+        for thing in objects.values():
+            origin = thing.label_pose[None, :3, 3]
+            place = furniture.in_cavity_frame(self._physics, part.name, origin)[0]
+            if (np.abs(place) < part.cavity.extents / 2).all():
+                inside.append(thing.body)
+        return tuple(inside)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +17,13 @@ from manipose_mj.control.grasp_candidates import (
     object_grasps,
     reachable,
 )
-from manipose_mj.control.motion_planner import MotionPlanner, equivalent_poses
+from manipose_mj.control.motion_planner import (
+    HANDLE_RETREATS,
+    MotionPlanner,
+    equivalent_poses,
+)
 from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
-from manipose_mj.poses import invert
+from manipose_mj.poses import invert, rotation_angle
 
 _STANDOFFS = (0.10, 0.06)
 # Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
@@ -79,7 +82,9 @@ def pick_object(
         raise StageFailure("plan", f"none of {len(grasps)} grasps of {thing.name} is in reach")
     free = _free_of_collision(planner, grasps, reach, thing.geoms)
     if not len(free.index):
-        raise StageFailure("plan", f"all {len(reach.index)} reachable grasps of {thing.name} collide")
+        raise StageFailure(
+            "plan", f"all {len(reach.index)} reachable grasps of {thing.name} collide"
+        )
     approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
     tries = 0
     for index, joints, goal in _with_destination(planner, grasps, free, thing, destinations):
@@ -120,7 +125,7 @@ def pick_part(
     touched = frozenset({planner.body_name(part.body)})
     for index, joints in zip(free.index, free.joints, strict=True):
         planner.scene.set_opening(float(grasps.openings[index]))
-        if opening is not None and planner.part_path(joints, part, opening) is None:
+        if opening is not None and not _can_move_part(planner, part, joints, opening):
             continue
         approach = _approach(planner, grasps, index, joints, part.geoms, touched)
         if approach is None:
@@ -134,6 +139,20 @@ def pick_part(
         f"no grasp of {part.name}'s handle works: {len(grasps)} tried, {len(reach.index)} in reach, "
         f"{len(free.index)} free of collision",
     )
+
+
+def _can_move_part(
+    planner: MotionPlanner, part: PartBelief, joints: Float[np.ndarray, "7"], opening: float
+) -> bool:
+    """Whether the arm can carry the handle all the way and get off it there."""
+    path = planner.part_path(joints, part, opening)
+    if path is None:
+        return False
+    with planner.part_at(part, opening):
+        back = planner.backed_off(path[-1], HANDLE_RETREATS[-1])
+        touched = frozenset({planner.body_name(part.body)})
+        line = planner.line(path[-1], back, clearance=_APPROACH, target=part.geoms, touched=touched)
+    return line is not None
 
 
 def _free_of_collision(
@@ -162,21 +181,21 @@ def _with_destination(
         yield from ((int(i), q, q) for i, q in zip(free.index, free.joints, strict=True))
         return
     goals = equivalent_poses(destinations, thing.label.symmetry)
-    # Evenly spaced in quality: the best grasps alone may all be alike.
-    count = max(1, min(len(free.index), _MAX_PAIRS // len(goals)))
-    chosen = np.unique(np.linspace(0, len(free.index) - 1, count).astype(int))
-    free, count = Reach(free.index[chosen], free.joints[chosen]), len(chosen)
-    starts = np.repeat(free.joints, len(goals), axis=0)
-    label_tcp = invert(thing.label_pose) @ grasps.tcp_poses[free.index]
+    tcp_starts = grasps.tcp_poses[free.index]
+    label_tcp = invert(thing.label_pose) @ tcp_starts
     tcp_goals = (goals[None] @ label_tcp[:, None]).reshape(-1, 4, 4)
+    owner = np.repeat(np.arange(len(free.index)), len(goals))
+    promise = _promise(tcp_starts[owner], tcp_goals) + owner / len(free.index)
+    likely = np.argsort(promise, kind="stable")[:_MAX_PAIRS]
+    owner, tcp_goals, promise = owner[likely], tcp_goals[likely], promise[likely]
+    starts = free.joints[owner]
     reach = reachable(tcp_goals, free.joints.mean(axis=0), extra_seeds=starts)
     travel = np.abs(reach.joints - starts[reach.index]).max(axis=1)
-    rank = (reach.index // len(goals)) / count
     # A short way with a middling grasp beats a long one with the best.
-    order = np.argsort(travel + rank, kind="stable")
+    order = np.argsort(travel + promise[reach.index], kind="stable")
     used: dict[int, int] = {}
     for k in order:
-        grasp = int(reach.index[k] // len(goals))
+        grasp = int(owner[reach.index[k]])
         if used.get(grasp, 0) == 2:
             continue
         index = int(free.index[grasp])
@@ -186,6 +205,17 @@ def _with_destination(
             continue
         used[grasp] = used.get(grasp, 0) + 1
         yield index, free.joints[grasp], reach.joints[k]
+
+
+def _promise(
+    tcp_starts: Float[np.ndarray, "n 4 4"], tcp_goals: Float[np.ndarray, "n 4 4"]
+) -> Float[np.ndarray, "n"]:
+    """A guess, before any kinematics, at how hard a pair is: less is better.
+
+    Coming from above meets the least; a hand that has to turn little can do it anywhere.
+    """
+    turn = rotation_angle(tcp_starts[:, :3, :3], tcp_goals[:, :3, :3])
+    return 1 + tcp_goals[:, 2, 2] + turn / np.pi
 
 
 def _can_set_down(

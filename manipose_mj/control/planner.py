@@ -10,14 +10,16 @@ from manipose_mj.control.plan import Plan, Step
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.goals import Goal, PoseGoal
-from manipose_mj.tasks.success import box_corners
 
 # How far to open, of the joint's range: all the way would ram the stop.
 OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
 # The object is let go this high above the surface it shall rest on [m].
 DROP_HEIGHT = 0.002
-CAVITY_MARGIN = 0.004
+CAVITY_MARGIN = 0.01
+# Where in the cavity, as a share of the free way from its middle to its front: the hand that sets
+# something down needs room in front of what is above.
+FRONT_SHIFTS = (0.35, 0.5, 0.2)
 
 
 def make_plan(goal: Goal, belief: Belief) -> Plan:
@@ -60,7 +62,7 @@ def poses_in_cavity(
       opening: Joint position while the object is put in [m or rad].
 
     Returns:
-      `T_world_label`, lying ones first: what lies low is easiest to shut away.
+      `T_world_label`, lying ones first, which are easiest to shut away, and towards the front.
     """
     cavity = part.cavity
     if cavity is None:
@@ -68,17 +70,19 @@ def poses_in_cavity(
     carrier = part.base_pose
     if cavity.moves_with_part and part.joint.kind == "slide":
         carrier = part.base_pose @ compose(np.eye(3), part.joint.axis * opening)
-    corners = box_corners(thing.label.extents)
+    outwards = part.handle.rotation[:, 1]
     found = []
     for rotation in _axis_aligned_rotations():
-        reach = np.abs(corners @ rotation.T).max(axis=0)
-        if (2 * reach > cavity.extents - CAVITY_MARGIN).any():
+        reach = np.abs(rotation) @ thing.label.extents / 2
+        slack = (cavity.extents - CAVITY_MARGIN) / 2 - reach
+        if (slack < 0).any():
             continue
-        floor = -cavity.extents[2] / 2 + reach[2] + DROP_HEIGHT
-        center = cavity.center + np.array([0.0, 0.0, floor])
-        found.append((reach[2], carrier @ compose(rotation, center)))
-    found.sort(key=lambda entry: round(entry[0], 4))
-    return tuple(pose for _, pose in found)
+        floor = np.array([0.0, 0.0, -cavity.extents[2] / 2 + reach[2] + DROP_HEIGHT])
+        for shift in FRONT_SHIFTS:
+            center = cavity.center + floor + shift * outwards * slack
+            found.append((reach[2], -shift, carrier @ compose(rotation, center)))
+    found.sort(key=lambda entry: (round(entry[0], 4), entry[1]))
+    return tuple(pose for _, _, pose in found)
 
 
 def _axis_aligned_rotations() -> list[Float[np.ndarray, "3 3"]]:

@@ -30,13 +30,15 @@ class Clearance:
       carried: Between what is carried and everything but the gripper.
     """
 
-    arm: float = 0.006
-    target: float = 0.0
-    carried: float = 0.002
+    arm: float
+    target: float
+    carried: float
 
 
-TRANSIT = Clearance()
-CONTACT = Clearance(arm=0.001, target=-0.003, carried=-0.003)
+# Paths through free space; the same once their corners are rounded; motions that end in contact.
+TRANSIT = Clearance(arm=0.008, target=0.0, carried=0.005)
+ROUNDED = Clearance(arm=0.003, target=0.0, carried=0.001)
+CONTACT = Clearance(arm=0.003, target=-0.003, carried=-0.003)
 
 
 @dataclass(frozen=True)

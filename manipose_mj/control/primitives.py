@@ -11,7 +11,7 @@ from manipose_mj.control.belief import Belief, PartBelief
 from manipose_mj.control.executor import Actions, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import OPENING_MARGIN
-from manipose_mj.control.motion_planner import RETREATS, MotionPlanner
+from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
 from manipose_mj.control.planning_scene import CONTACT, carried_free_body
@@ -88,7 +88,7 @@ class Primitives:
     def _retreat(self, belief: Belief, name: str) -> Float[np.ndarray, "t 7"]:
         thing = belief.parts.get(name) or belief.objects[name]
         clearance = replace(CONTACT, arm=0.0)
-        for distance in RETREATS:
+        for distance in HANDLE_RETREATS if name in belief.parts else RETREATS:
             line = self._planner.line(
                 belief.joints,
                 self._planner.backed_off(belief.joints, distance),
@@ -106,7 +106,10 @@ class Primitives:
         pose_tcp = self._check_held(belief, step.subject)
         tcp = self._planner.tcp_pose(belief.joints)
         carried = carried_free_body(
-            self._planner.scene.model, thing.body, self._planner.free_joint(thing), invert(tcp) @ thing.pose
+            self._planner.scene.model,
+            thing.body,
+            self._planner.free_joint(thing),
+            invert(tcp) @ thing.pose,
         )
         place = self._planner.place(pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal)
         if place is None:
@@ -164,7 +167,9 @@ class Primitives:
         # A handle may slide along its bar and turn about it; what counts there is the joint.
         is_part = name in belief.parts
         if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
-            raise StageFailure("grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand")
+            raise StageFailure(
+                "grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand"
+            )
         return now
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float
 
-TABLE_HALF_EXTENTS = (0.65, 0.8, 0.02)
-TABLE_CENTER = (0.45, 0.0, -0.02)
+TABLE_HALF_EXTENTS = (0.72, 0.8, 0.02)
+TABLE_CENTER = (0.52, 0.0, -0.02)
 TABLE_HEIGHT = 0.75
 PHYSICS_TIMESTEP = 0.002
 
@@ -17,7 +17,7 @@ MARKER_GROUP = 4
 
 # Position and the point looked at, in the world frame [m]; vertical field of view [deg].
 FIXED_CAMERAS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
-    "overview": ((1.25, -1.05, 0.95), (0.38, 0.0, 0.18), 45.0),
+    "overview": ((-0.25, -1.15, 0.95), (0.45, 0.02, 0.15), 45.0),
     "front": ((1.30, 0.0, 0.65), (0.40, 0.0, 0.10), 45.0),
     "left": ((0.45, 0.95, 0.60), (0.45, 0.0, 0.10), 45.0),
     "right": ((0.45, -0.95, 0.60), (0.45, 0.0, 0.10), 45.0),

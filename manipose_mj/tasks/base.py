@@ -127,8 +127,9 @@ class ManipulationTask(composer.Task):
         self.place_objects(physics, random_state)
         self._robot_geoms = _membership(physics, self.robot)
         self.success_once = False
-        with physics.suppress_physics_errors():
-            physics.step(round(SETTLE_TIME / self.physics_timestep))
+        # dm_control's step begins with the second half of the last one.
+        physics.forward()
+        physics.step(round(SETTLE_TIME / self.physics_timestep))
         physics.data.time = 0.0
         self.max_penetration = 0.0
 
@@ -146,9 +147,7 @@ class ManipulationTask(composer.Task):
             )
         self.robot.apply_targets(physics, action[:7], float(action[7]))
 
-    def after_substep(
-        self, physics: mjcf.Physics, random_state: np.random.RandomState
-    ) -> None:
+    def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         if physics.data.ncon:
             self.max_penetration = max(
                 self.max_penetration, -float(physics.data.contact.dist.min())

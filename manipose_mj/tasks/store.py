@@ -30,7 +30,7 @@ class StoreConfig(TaskConfig):
 
     horizon: float = 90.0
     part: str = "middle_drawer"
-    furniture_x: tuple[float, float] = (0.62, 0.67)
+    furniture_x: tuple[float, float] = (0.73, 0.77)
     furniture_y: tuple[float, float] = (0.05, 0.15)
     furniture_yaw: float = radians(6)
     x_range: tuple[float, float] = (0.32, 0.48)
@@ -40,7 +40,7 @@ class StoreConfig(TaskConfig):
 class Store(ManipulationTask):
     """Open the drawer, lay the object inside, let go, shut the drawer.
 
-    Success: the object's whole bounding box is in the drawer's cavity, at rest and released, and
+    Success: the whole object is in the drawer's cavity, at rest and released, and
     the drawer is shut to within 1 cm.
     """
 
@@ -114,7 +114,9 @@ class Store(ManipulationTask):
         for part in self.furniture.asset.parts:
             physics.bind(self.furniture.joint(part.name)).qpos = part.joint.range[0]
         start = random_state.randint(len(self.object.asset.stable_poses))
-        xy = np.array([random_state.uniform(*config.x_range), random_state.uniform(*config.y_range)])
+        xy = np.array(
+            [random_state.uniform(*config.x_range), random_state.uniform(*config.y_range)]
+        )
         pose = pose_on_table(self.object.asset, start, xy, random_state.uniform(-np.pi, np.pi))
         self.object.place(physics, pose)
 
@@ -141,6 +143,7 @@ class Store(ManipulationTask):
             inside_cavity(
                 label_pose_cavity,
                 self.object.asset.label.extents,
+                self.object.asset.label.symmetry.axial,
                 self.part.cavity.extents,
                 self.config.tolerance.cavity_slack,
             )

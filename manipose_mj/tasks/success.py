@@ -1,8 +1,8 @@
 """What counts as success, written once as functions of arrays (NumPy or JAX).
 
 Definitions: a pose goal is met when the symmetric pose error is within tolerance, the object is at
-rest and the gripper has let go; an object is stored when its whole bounding box lies in the cavity
-and the part that closes it is shut.
+rest and the gripper has let go; an object is stored when all of it, by its bounding box or cylinder, lies
+in the cavity and the part that closes it is shut.
 """
 
 from __future__ import annotations
@@ -10,17 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 
-import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.poses import Array, SymmetryGroup, namespace, pose_error, transform
+from manipose_mj.poses import Array, SymmetryGroup, namespace, pose_error
 
 
 @dataclass(frozen=True)
 class Tolerance:
     """Attributes: translation [m], rotation [rad], linear_speed [m/s], angular_speed [rad/s];
-    shut: how far from its shut limit a joint may stay [m or rad]; cavity_slack: how far a corner
-    of the bounding box may stick out of the cavity [m]."""
+    shut: how far from its shut limit a joint may stay [m or rad]; cavity_slack: how far the
+    object may stick out of the cavity [m]."""
 
     translation: float = 0.02
     rotation: float = radians(15)
@@ -62,30 +61,34 @@ def pose_goal_met(
     return near & at_rest(linear_speed, angular_speed, tolerance) & ~touched
 
 
-def box_corners(extents: Float[np.ndarray, "3"]) -> Float[np.ndarray, "8 3"]:
-    """The corners of a centred box with these full lengths."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    return signs * np.asarray(extents) / 2
-
-
 def inside_cavity(
     label_pose_cavity: Float[Array, "*b 4 4"],
     label_extents: Float[Array, "3"],
+    axial: bool,
     cavity_extents: Float[Array, "3"],
     slack: float,
 ) -> Bool[Array, "*b"]:
-    """Whether the object's bounding box lies in the cavity.
+    """Whether the object's bounding box, or cylinder if it is axial, lies in the cavity.
 
     Args:
       label_pose_cavity: `T_cavity_label`; the cavity's frame is centred in it.
       label_extents: Of the object's bounding box along the label's axes [m].
+      axial: Whether the label's X is an axis of revolution.
       cavity_extents: Full lengths [m].
       slack: How far a corner may stick out [m].
     """
     xp = namespace(label_pose_cavity)
-    corners = xp.asarray(box_corners(np.asarray(label_extents)), dtype=label_pose_cavity.dtype)
-    limit = xp.asarray(cavity_extents, dtype=label_pose_cavity.dtype) / 2 + slack
-    return xp.all(xp.abs(transform(label_pose_cavity, corners)) <= limit, axis=(-2, -1))
+    dtype = label_pose_cavity.dtype
+    half = xp.asarray(label_extents, dtype=dtype) / 2
+    rotation = xp.abs(label_pose_cavity[..., :3, :3])
+    if axial:
+        along = rotation[..., 0]
+        radius = xp.max(half[1:])
+        reach = along * half[0] + xp.sqrt(xp.clip(1 - along**2, 0.0, 1.0)) * radius
+    else:
+        reach = rotation @ half
+    limit = xp.asarray(cavity_extents, dtype=dtype) / 2 + slack
+    return xp.all(xp.abs(label_pose_cavity[..., :3, 3]) + reach <= limit, axis=-1)
 
 
 def stored(

@@ -153,9 +153,7 @@ def _pose_pairs(asset: Asset, config: TargetPoseConfig) -> list[tuple[int, int]]
     for i, start in enumerate(asset.stable_poses):
         for j, goal in enumerate(asset.stable_poses):
             # The turn that no yaw can undo: between the verticals seen from the object.
-            turn = float(
-                np.arccos(np.clip(start.rotation[2] @ goal.rotation[2], -1.0, 1.0))
-            )
+            turn = float(np.arccos(np.clip(start.rotation[2] @ goal.rotation[2], -1.0, 1.0)))
             shared = int((clear[:, i] & clear[:, j]).sum())
             if shared >= config.min_shared_grasps and turn <= config.max_turn:
                 pairs.append((i, j))

@@ -40,7 +40,13 @@ def push(model: mujoco.MjModel, data: mujoco.MjData, part: MovingPart, force: fl
     point = body.xpos + turn @ part.handle.origin
     data.qfrc_applied[:] = 0
     mujoco.mj_applyFT(
-        model, data, force * outwards, np.zeros(3), point, model.body(part.name).id, data.qfrc_applied
+        model,
+        data,
+        force * outwards,
+        np.zeros(3),
+        point,
+        model.body(part.name).id,
+        data.qfrc_applied,
     )
     mujoco.mj_step(model, data)
 
@@ -180,6 +186,9 @@ def test_drawers_take_a_lying_can_and_keep_low_walls(index):
         depth, width, height = part.cavity.extents
         assert depth >= 0.24 and width >= 0.29 and height >= 0.10
         assert part.cavity.moves_with_part
+        # Wide open, its back is still in the carcass.
+        back = part.cavity.center[0] + depth / 2 + cabinet.wall
+        assert back - part.joint.range[1] > -cabinet.depth / 2 + 0.005
     assert not moving_parts(index)[3].cavity.moves_with_part
 
 

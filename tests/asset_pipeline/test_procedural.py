@@ -87,7 +87,9 @@ def collision_skin(body: Body) -> np.ndarray:
     corners = 0.98 * skin.triangles + 0.02 * skin.triangles.mean(axis=1, keepdims=True)
     spread, faces = trimesh.sample.sample_surface(skin, 500, seed=1)
     points = np.concatenate([corners.reshape(-1, 3)[::5], spread])
-    normals = np.concatenate([np.repeat(skin.face_normals, 3, axis=0)[::5], skin.face_normals[faces]])
+    normals = np.concatenate(
+        [np.repeat(skin.face_normals, 3, axis=0)[::5], skin.face_normals[faces]]
+    )
     # Gaps between neighbouring parts narrower than this are inside for all purposes.
     probes = points + 0.7 * MM * normals
     covered = np.zeros(len(points), bool)
@@ -182,7 +184,7 @@ RANGES = {  # extents along the label's X, Y, Z [mm], with the handle and lips
     "mug": ((80, 110), (102, 135), (72, 95)),
     "box": ((90, 210), (55, 140), (30, 70)),
     "bowl": ((45, 75), (118, 170), (118, 170)),
-    "cabinet": ((390, 420), (370, 400), (560, 680)),
+    "cabinet": ((390, 420), (370, 480), (560, 680)),
 }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import json
 import os
 import signal
@@ -13,6 +12,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+import fake_episodes as fake
 import pytest
 
 from manipose_mj.errors import InputError, WorkerDiedError
@@ -21,11 +21,7 @@ from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.records import EpisodeResult, read_results, read_trajectory
 from manipose_mj.evaluation.runner import evaluate
 
-SCRIPT = Path(__file__).with_name("fake_episodes.py")
-_spec = importlib.util.spec_from_file_location("fake_episodes", SCRIPT)
-assert _spec is not None and _spec.loader is not None
-fake = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(fake)
+SCRIPT = Path(fake.__file__)
 
 
 def timeless(path: Path) -> list[dict]:

@@ -1,0 +1,54 @@
+"""A hash of a module's own source and of every module of ours that it imports, directly or not."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+_ROOT = Path(__file__).parent.parent
+_PACKAGES = ("asset_pipeline", "manipose_mj")
+
+
+def source_hash(module: str, *extra: str) -> str:
+    """Twelve hexadecimal digits that change when any of the code does.
+
+    Args:
+      module: Full name of a module of this distribution.
+      extra: Further strings that results depend on, such as a library's version.
+    """
+    digest = hashlib.sha256("\n".join(extra).encode())
+    for path in sorted(sources(module)):
+        digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def sources(module: str) -> set[Path]:
+    """The files of a module and of all it imports from this distribution."""
+    found: set[Path] = set()
+    waiting = [module]
+    while waiting:
+        path = _file(waiting.pop())
+        if path is not None and path not in found:
+            found.add(path)
+            waiting += _imported(ast.parse(path.read_bytes()))
+    return found
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _file(module: str) -> Path | None:
+    """Where the module's source is; None for what is not a module of ours."""
+    if module.split(".")[0] not in _PACKAGES:
+        return None
+    stem = _ROOT.joinpath(*module.split("."))
+    candidates = (stem.with_suffix(".py"), stem / "__init__.py")
+    return next((path for path in candidates if path.is_file()), None)
