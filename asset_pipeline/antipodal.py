@@ -34,7 +34,7 @@ def antipodal_pairs(
     cone = np.cos(np.arctan(FRICTION))
     widest = gripper.max_opening - gripper.min_clearance
     for i in rng.permutation(len(points))[:SEEDS].tolist():
-        facing = np.sqrt(np.maximum(0.5 - 0.5 * (normals @ normals[i]), 0.0))
+        facing = np.sqrt(np.maximum(0.5 - 0.5 * np.einsum("ni,i->n", normals, normals[i]), 0.0))
         opposed = np.flatnonzero(facing > cone)  # cosine of either normal to their mean
         closing = (normals[opposed] - normals[i]) / (2 * facing[opposed, None])
         offset = points[opposed] - points[i]

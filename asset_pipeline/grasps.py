@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from asset_pipeline.antipodal import antipodal_pairs
 from asset_pipeline.assets import GraspSet, StablePose
@@ -47,10 +48,12 @@ def sample_grasps(
     rng = np.random.default_rng(seed)
     touch = union_points(body.collision, rng)
     obstacles = np.concatenate([touch.points, surface_points(body.surface(), rng).points])
+    corners = np.concatenate([s.surface().vertices for s in body.collision])
+    corners = corners[ConvexHull(corners).vertices]  # sharp ones stick out between the points
     cloud = ObjectCloud(
         touch=touch,
-        obstacles=obstacles,
-        coarse=obstacles[first_in_cells(obstacles / COARSE_CELL)],
+        obstacles=np.concatenate([corners, obstacles]),
+        coarse=np.concatenate([corners, obstacles[first_in_cells(obstacles / COARSE_CELL)]]),
         mass_properties=body.mass_properties,
     )
     ups = [p.rotation[2] for p in stable_poses] or [np.array([0.0, 0.0, 1.0])]

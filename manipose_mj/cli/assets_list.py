@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.process import CORES
-
 if TYPE_CHECKING:
     from asset_pipeline.assets import Asset
 

@@ -75,7 +75,7 @@ def run_and_report(config, *, resume: bool) -> int:
 
         results = run(config, resume=resume, on_progress=show)
     with output.working_on("drawing the report"):
-        report = write_report(config.out)
+        report = write_report(config.out, jobs=config.jobs)
     console = output.standard_output()
     console.print(output.summary_table(summarize(results)))
     console.print(f"report: {report}", soft_wrap=True)

@@ -16,6 +16,7 @@ from manipose_mj.control.grasp_candidates import reachable
 from manipose_mj.control.line_motion import LineConfig, line_poses, track
 from manipose_mj.control.planning_scene import (
     CONTACT,
+    GRAZING,
     ROUNDED,
     TRANSIT,
     Carried,
@@ -40,6 +41,8 @@ HANDLE_RETREATS = (0.10, 0.07, 0.045)
 _MAX_PLACES = 8
 # Of every so many control steps one is checked for collision.
 _CHECK_EVERY = 4
+# From its support on which a carried thing must be free [m].
+_SUPPORT_DISTANCE = 0.02
 _SPEED_SHARES = (1.0, 0.5, 0.25, 0.1)
 
 
@@ -105,18 +108,24 @@ class MotionPlanner:
         *,
         carried: Carried | None = None,
     ) -> Float[np.ndarray, "t 7"] | None:
-        """Joint targets from rest to rest through free space; None if no path was found."""
-        with self.scene.query(clearance=TRANSIT, carried=carried) as scene:
-            path = plan_path(start, goal, scene.in_collision, self._rng)
-        if path is None:
-            return None
-        # Rounding the corners leaves the path that was checked; slower leaves it less.
-        with self.scene.query(clearance=ROUNDED, carried=carried) as scene:
-            for share in _SPEED_SHARES:
-                timing = replace(self._timing, speed=share * self._timing.speed)
-                targets = timed(path, self._timestep, timing)
-                if not any(scene.in_collision(q) for q in targets[::_CHECK_EVERY]):
-                    return targets
+        """Joint targets from rest to rest through free space; None if no path was found.
+
+        Keeps as far from everything as the two ends allow.
+        """
+        for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING)):
+            if any(self.collides(q, clearance=wide, carried=carried) for q in (start, goal)):
+                continue
+            with self.scene.query(clearance=wide, carried=carried) as scene:
+                path = plan_path(start, goal, scene.in_collision, self._rng)
+            if path is None:
+                return None
+            # Rounding the corners leaves the path that was checked; slower leaves it less.
+            with self.scene.query(clearance=close, carried=carried) as scene:
+                for share in _SPEED_SHARES:
+                    timing = replace(self._timing, speed=share * self._timing.speed)
+                    targets = timed(path, self._timestep, timing)
+                    if not any(scene.in_collision(q) for q in targets[::_CHECK_EVERY]):
+                        return targets
         return None
 
     def line(
@@ -129,7 +138,10 @@ class MotionPlanner:
         carried: Carried | None = None,
         touched: frozenset[str] = frozenset(),
     ) -> Float[np.ndarray, "t 7"] | None:
-        """Joint targets along a straight line of the TCP to `goal`; None if it is not free."""
+        """Joint targets along a straight line of the TCP to `goal`; None if it is not free.
+
+        What is carried may touch its support at the beginning only.
+        """
         start = self.tcp_pose(joints)
         self._arm.follow(self.scene)
         targets = None
@@ -142,9 +154,11 @@ class MotionPlanner:
                 break
         if targets is None:
             return None
-        with self.scene.query(clearance=clearance, target=target, carried=carried) as scene:
-            checked = [*targets[_CHECK_EVERY::_CHECK_EVERY], targets[-1]]
-            if any(scene.in_collision(q) for q in checked):
+        lifted = replace(clearance, carried=max(clearance.carried, ROUNDED.carried))
+        for q in [*targets[_CHECK_EVERY::_CHECK_EVERY], targets[-1]]:
+            gone = float(np.linalg.norm(self.tcp_pose(q)[:3, 3] - start[:3, 3]))
+            allowed = lifted if gone > _SUPPORT_DISTANCE else clearance
+            if self.collides(q, clearance=allowed, target=target, carried=carried):
                 return None
         return targets
 
@@ -179,10 +193,12 @@ class MotionPlanner:
         if self.collides(joints, clearance=CONTACT, carried=carried):
             return None
         # What is let go stays behind: only the arm has to get away.
-        alone = replace(CONTACT, carried=-np.inf)
         back = self.backed_off(joints, RETREATS[-1])
-        if self.line(joints, back, clearance=alone, carried=carried) is None:
-            return None
+        left_behind = Carried(carried.geoms, lambda qpos, tcp_pose: None)
+        with self.scene.query(clearance=CONTACT, carried=carried) as scene:
+            scene.first_collision(joints)  # puts what is carried in its place
+            if self.line(joints, back, clearance=CONTACT, carried=left_behind) is None:
+                return None
         for height in _DESCENTS:
             above = self.tcp_pose(joints)
             above[2, 3] += height

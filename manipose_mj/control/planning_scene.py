@@ -35,9 +35,11 @@ class Clearance:
     carried: float
 
 
-# Paths through free space; the same once their corners are rounded; motions that end in contact.
+# Paths through free space; the same once their corners are rounded; the same where the ends leave
+# less room; motions that end in contact.
 TRANSIT = Clearance(arm=0.008, target=0.0, carried=0.005)
 ROUNDED = Clearance(arm=0.003, target=0.0, carried=0.001)
+GRAZING = Clearance(arm=0.001, target=0.0, carried=0.0)
 CONTACT = Clearance(arm=0.003, target=-0.003, carried=-0.003)
 
 

@@ -14,7 +14,7 @@ from manipose_mj.control.grasp_candidates import OPENING_MARGIN
 from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
-from manipose_mj.control.planning_scene import CONTACT, carried_free_body
+from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
 from manipose_mj.mjcf.panda import MAX_OPENING
 from manipose_mj.poses import invert, rotation_angle
 
@@ -101,36 +101,43 @@ class Primitives:
         raise StageFailure("release", f"no way to back off from {name}")
 
     def _move_object(self, step: Step, pick: ObjectPick) -> Actions:
+        name = step.subject
+        yield from self._executor.follow(self._lift(name))
+        # Things turn a little in the hand when their weight comes on it: measure, then plan.
         belief = self._executor.perceive()
-        thing = belief.objects[step.subject]
-        pose_tcp = self._check_held(belief, step.subject)
-        tcp = self._planner.tcp_pose(belief.joints)
-        carried = carried_free_body(
-            self._planner.scene.model,
-            thing.body,
-            self._planner.free_joint(thing),
-            invert(tcp) @ thing.pose,
-        )
+        pose_tcp = self._check_held(belief, name)
+        thing, carried = belief.objects[name], self._carried(belief, name)
         place = self._planner.place(pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal)
         if place is None:
-            raise StageFailure("plan", f"no way to set {step.subject} down where it should go")
-        lift = None
+            raise StageFailure("plan", f"no way to set {name} down where it should go")
+        free = self._planner.free_path(belief.joints, place.above, carried=carried)
+        if free is None:
+            raise StageFailure("plan", f"no path for {name} to where it should go")
+        yield from self._executor.follow(free)
+        self._check_held(self._executor.perceive(), name)
+        yield from self._executor.follow(place.descent)
+
+    def _lift(self, name: str) -> Float[np.ndarray, "t 7"]:
+        belief = self._executor.perceive()
+        carried = self._carried(belief, name)
+        tcp = self._planner.tcp_pose(belief.joints)
         for height in _LIFTS:
             lift = self._planner.line(
                 belief.joints, _raised(tcp, height), clearance=CONTACT, carried=carried
             )
             if lift is not None:
-                break
-        if lift is None:
-            raise StageFailure("plan", f"no way to lift {step.subject}")
-        free = self._planner.free_path(lift[-1], place.above, carried=carried)
-        if free is None:
-            raise StageFailure("plan", f"no path for {step.subject} to where it should go")
-        yield from self._executor.follow(lift)
-        self._check_held(self._executor.perceive(), step.subject)
-        yield from self._executor.follow(free)
-        self._check_held(self._executor.perceive(), step.subject)
-        yield from self._executor.follow(place.descent)
+                return lift
+        raise StageFailure("plan", f"no way to lift {name}")
+
+    def _carried(self, belief: Belief, name: str) -> Carried:
+        thing = belief.objects[name]
+        inverse = invert(self._planner.tcp_pose(belief.joints))
+        return carried_free_body(
+            self._planner.scene.model,
+            thing.body,
+            self._planner.free_joint(thing),
+            inverse @ thing.pose,
+        )
 
     def _move_part(self, step: Step, pick: PartPick) -> Actions:
         assert step.opening is not None

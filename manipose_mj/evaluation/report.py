@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import joblib
 import mujoco
 from markupsafe import Markup
 
@@ -46,14 +47,15 @@ def simulated(task: str, **options: Any) -> mujoco.MjModel:
     return scene_model(task, **options)
 
 
-def write_report(out: Path, *, scene: Scene = simulated) -> Path:
+def write_report(out: Path, *, jobs: int = 1, scene: Scene = simulated) -> Path:
     """Write `report.html` into the folder of a finished evaluation.
 
     What cannot be drawn is left out with a line that says why.
 
     Args:
       out: The evaluation's folder.
-      scene: Makes the model of an episode.
+      jobs: Episodes to draw at the same time.
+      scene: Makes the model of an episode; must survive pickling by `cloudpickle`.
 
     Returns:
       The report's path.
@@ -76,11 +78,16 @@ def write_report(out: Path, *, scene: Scene = simulated) -> Path:
     )
     environment.filters["scaled"] = _scaled
     ordered = sorted(results, key=lambda r: r.key)
+    tasks = {task: list(group) for task, group in groupby(ordered, key=lambda r: r.task)}
+    films = [film for group in tasks.values() for film in choose(group)]
+    drawn = joblib.Parallel(n_jobs=max(1, min(jobs, len(films))), batch_size=1)(
+        joblib.delayed(_drawn)(film, out, summary, scene) for film in films
+    )
     html = environment.get_template("report_template.html").render(
         summary=summary,
         sections=[
-            _section(out, task, list(episodes), summary, scene)
-            for task, episodes in groupby(ordered, key=lambda r: r.task)
+            _section(task, group, summary, [f for f in drawn if f.result.task == task])
+            for task, group in tasks.items()
         ],
         episodes=len(results),
         wall=timedelta(seconds=round(sum(r.wall_s for r in results))),
@@ -92,7 +99,7 @@ def write_report(out: Path, *, scene: Scene = simulated) -> Path:
 
 
 def _section(
-    out: Path, task: str, results: list[EpisodeResult], summary: dict[str, Any], scene: Scene
+    task: str, results: list[EpisodeResult], summary: dict[str, Any], films: list[Film]
 ) -> dict[str, Any]:
     return {
         "task": task,
@@ -100,7 +107,7 @@ def _section(
         "row": summary["tasks"][task],
         "objects": _by_object(results),
         "histograms": [Markup(svg) for svg in error_histograms(results, Tolerance())],
-        "films": [_drawn(film, out, summary, scene) for film in choose(results)],
+        "films": films,
         "failed": [r for r in results if r.failure is not None],
     }
 

@@ -119,10 +119,14 @@ def evaluate(
 @contextmanager
 def _results_file(out: Path) -> Iterator[IO[bytes]]:
     """The open and locked results file; a disk that refuses becomes an `InputError`."""
-    path = out / RESULTS_FILE
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with path.open("ab") as file:
+        file = (out / RESULTS_FILE).open("ab")
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
+    try:
+        with file:
             _lock(file, out)
             yield file
     except OSError as error:
@@ -130,7 +134,7 @@ def _results_file(out: Path) -> Iterator[IO[bytes]]:
             raise
         raise InputError(
             f"{out}: cannot write results there ({error.strerror or error}); "
-            "whole results are safe: make room or choose another --out, and --resume goes on"
+            "those of finished episodes are safe: make room, then --resume goes on"
         ) from None
 
 

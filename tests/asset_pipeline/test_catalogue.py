@@ -73,8 +73,8 @@ def test_second_load_reads_the_cache():
 
 @pytest.mark.parametrize("category", ["box", "cabinet"])
 def test_same_index_gives_identical_bytes(category, tmp_path):
-    again = catalogue.build(category, 0, tmp_path / f"{category}_000")
-    assert contents(again.folder) == contents(catalogue.load(category, 0).folder)
+    again = catalogue.build(category, 1, tmp_path / f"{category}_001")
+    assert contents(again.folder) == contents(catalogue.load(category, 1).folder)
 
 
 def test_two_indices_differ(tmp_path):
@@ -98,12 +98,12 @@ def start_loading(root: Path, name: str, hash_seed: str) -> subprocess.Popen:
 def test_fresh_processes_agree_and_may_build_the_same_at_once(tmp_path):
     """Two share a cache and start together; the third is alone; hash seeds differ."""
     roots = (tmp_path / "shared", tmp_path / "shared", tmp_path / "alone")
-    processes = [start_loading(root, "box_002", str(i)) for i, root in enumerate(roots)]
+    processes = [start_loading(root, "box_001", str(i)) for i, root in enumerate(roots)]
     folders = [Path(process.communicate(timeout=120)[0].strip()) for process in processes]
     assert all(process.returncode == 0 for process in processes)
     assert folders[0] == folders[1] != folders[2]
     assert contents(folders[0]) == contents(folders[2])
-    assert sorted(path.name for path in folders[0].parent.iterdir()) == ["box_002"]
+    assert sorted(path.name for path in folders[0].parent.iterdir()) == ["box_001"]
 
 
 def test_losing_the_race_keeps_the_winners_folder(monkeypatch, cache_root):

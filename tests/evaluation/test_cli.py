@@ -200,7 +200,7 @@ def test_evaluate_into_a_place_that_is_no_folder(tmp_path: Path, capsys) -> None
     assert (
         main(["evaluate", *fake.TASKS, "--jobs", "1", "--out", str(tmp_path / "file" / "out")]) == 2
     )
-    assert "cannot write results there" in complaint(capsys)
+    assert "cannot write there" in complaint(capsys)
 
 
 @pytest.mark.usefixtures("fake_episodes")

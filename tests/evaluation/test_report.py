@@ -130,7 +130,7 @@ def test_what_cannot_be_drawn_is_said(evaluation: Path) -> None:
     def lost(task, **options):
         raise InputError("assets: no such folder")
 
-    page = write_report(evaluation, scene=lost).read_text(encoding="utf-8")
+    page = write_report(evaluation, jobs=2, scene=lost).read_text(encoding="utf-8")
     assert page.count("no pictures: assets: no such folder") == page.count("<figure>")
 
 

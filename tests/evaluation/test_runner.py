@@ -151,7 +151,7 @@ def test_a_broken_line_before_the_last_is_an_error(tmp_path: Path) -> None:
 
 def test_output_folder_under_a_file_is_an_input_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot write results there"):
+    with pytest.raises(InputError, match="cannot write there"):
         evaluate(config(tmp_path / "file" / "out"), runner=fake.make_runner())
 
 
