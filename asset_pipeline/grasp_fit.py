@@ -17,7 +17,7 @@ APPROACHES = 24
 DEPTHS = (0.0, 0.005)  # of the pair beyond the pads' centre, towards the tips [m]
 STANDOFF = 0.10  # where the straight approach starts [m]
 MARGIN = 0.0015  # kept between the open fingers and the object's points [m]
-COARSE_CELL = 0.005  # for the hand's large boxes fewer points do, with a larger margin [m]
+COARSE_CELL = 0.010  # for the hand's large boxes fewer points do, with a larger margin [m]
 COARSE_MARGIN = 0.003
 PAD_DEPTH = 0.001  # points this close to the first touched count as touched [m]
 MIN_COVER = 0.25  # least share of a pad that must touch
@@ -250,17 +250,20 @@ def _meets(
         return meets
     y = _along(axes[:1, :, 1], points)[0]
     shift = np.einsum("ki,kij->kj", origins, axes)
+    fronts = boxes[:, :, 1, 2].max(axis=0)
     boxes = boxes + shift[:, None, None]
     low, high = boxes[:, :, 0, 1].min(axis=0), boxes[:, :, 1, 1].max(axis=0)
     layer = ((y[:, None] > low) & (y[:, None] < high)).any(axis=1)
     points, y = points[layer], y[layer]
     x, z = _along(axes[:, :, 0], points), _along(axes[:, :, 2], points)
-    for box in boxes.transpose(1, 0, 2, 3):
+    # The origins lie within `DEPTHS` of each other, so this is the distance from any hand's y axis.
+    radius = np.hypot(x[0] - shift[0, 0], z[0] - shift[0, 2]) + max(DEPTHS) + margin
+    for box, front in zip(boxes.transpose(1, 0, 2, 3), fronts, strict=True):
         left = np.flatnonzero(~meets)  # of the hands, those that no box before this one stopped
         if len(left) == 0:
             break
         (x0, y0, z0), (x1, y1, z1) = box[left].transpose(1, 2, 0)[..., None]
-        near = np.flatnonzero((y > y0.min()) & (y < y1.max()))
+        near = np.flatnonzero((y > y0.min()) & (y < y1.max()) & (radius > -front))
         inside = z[np.ix_(left, near)] < z1 + margin
         near = near[inside.any(axis=0)]  # most points lie in front of the box
         grid = np.ix_(left, near)

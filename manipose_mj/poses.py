@@ -70,9 +70,7 @@ def rotation_to_quaternion(rotation: Float[Array, "*b 3 3"]) -> Float[Array, "*b
     trace = m[0][0] + m[1][1] + m[2][2]
     outer = xp.stack(  # four times q q^T, row by row
         [
-            xp.stack(
-                [1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]], axis=-1
-            ),
+            xp.stack([1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]], axis=-1),
             xp.stack(
                 [
                     m[2][1] - m[1][2],
@@ -184,9 +182,10 @@ class SymmetryGroup:
             if fresh:
                 members.append(fresh[0])
             if len(members) > 60:
-                raise ValueError("these rotations generate more than 60 members; not a finite group")
+                raise ValueError(
+                    "these rotations generate more than 60 members; not a finite group"
+                )
         return cls(np.stack(members))
-
 
     def sampled(self, turns: int = 16) -> Float[np.ndarray, "m 3 3"]:
         """Members of the group as a list; a continuous axis is sampled at `turns` equal angles."""

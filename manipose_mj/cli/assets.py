@@ -10,8 +10,8 @@ from manipose_mj.cli import assets_build, assets_check, assets_list, assets_show
 def build_app() -> SubcommandApp:
     """The commands under `manipose assets`."""
     app = SubcommandApp()
-    app.command(assets_build.build_assets, name="build")
-    app.command(assets_check.check_assets, name="check")
-    app.command(assets_list.list_objects, name="list")
-    app.command(assets_show.show_asset, name="show")
+    app.command(name="build")(assets_build.build_assets)
+    app.command(name="check")(assets_check.check_assets)
+    app.command(name="list")(assets_list.list_objects)
+    app.command(name="show")(assets_show.show_asset)
     return app

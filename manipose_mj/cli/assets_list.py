@@ -1,4 +1,4 @@
-"""`manipose assets list`: what is in a folder of assets."""
+"""`manipose assets list`: what is in a folder of assets, or built in."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.cli.process import CORES
+
 if TYPE_CHECKING:
     from asset_pipeline.assets import Asset
 
 
 def list_objects(
-    directory: Annotated[Positional[Path], arg(metavar="DIR")],
+    directory: Annotated[
+        Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")
+    ] = None,
     /,
     *,
     json: bool = False,
@@ -20,13 +24,18 @@ def list_objects(
     """List assets with their category, type, mass, stable poses and grasps.
 
     Args:
-      directory: Folder of assets.
+      directory: Folder of assets; without it the built-in objects, which the first time takes a minute.
       json: Print JSON, for other programs.
     """
     from asset_pipeline.assets import list_assets, read_asset
     from manipose_mj.cli import output
+    from manipose_mj.cli.builtin_objects import all_names, load_objects
 
-    rows = [summary(read_asset(folder)) for folder in list_assets(directory)]
+    if directory is None:
+        assets = load_objects(all_names(), CORES)
+    else:
+        assets = [read_asset(folder) for folder in list_assets(directory)]
+    rows = [summary(asset) for asset in assets]
     if json:
         output.write_json(rows)
         return

@@ -22,15 +22,18 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
     import joblib
 
     from asset_pipeline import catalogue
+    from asset_pipeline.assets import ASSET_FILE
     from manipose_mj.cli import output
 
-    found = {}
-    with output.Progress("built-in objects") as progress:
-        pool = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
-        for asset in pool(joblib.delayed(catalogue.load_by_name)(name) for name in names):
-            found[asset.name] = asset
-            progress.update(len(found), len(names), asset.name)
-    return [found[name] for name in names]
+    folder = catalogue.cache_folder()
+    missing = [name for name in names if not (folder / name / ASSET_FILE).is_file()]
+    if missing:
+        with output.Progress("built-in objects") as progress:
+            pool = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
+            calls = (joblib.delayed(catalogue.load_by_name)(name) for name in missing)
+            for done, asset in enumerate(pool(calls), start=1):
+                progress.update(done, len(missing), f"{asset.name} is built")
+    return [catalogue.load_by_name(name) for name in names]
 
 
 def all_names() -> list[str]:

@@ -155,7 +155,7 @@ def _mjx_jax() -> str:
 
 def _mjx_warp() -> str:
     _require("warp", "mujoco_warp")
-    import warp
+    import warp  # pyright: ignore[reportMissingImports]
 
     warp.config.quiet = True
     devices = [d.name for d in warp.get_cuda_devices()]

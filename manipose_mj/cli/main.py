@@ -23,7 +23,7 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(demo.demo)
     app.command(evaluate.evaluate)
-    app.command(tasks.list_tasks, name="list")
+    app.command(name="list")(tasks.list_tasks)
     app.command(render.render)
     app.command(assets.build_app(), name="assets", help="Build, check and inspect object assets.")
     app.command(doctor.doctor)

@@ -50,6 +50,9 @@ def render(
     with output.working_on("drawing"):
         model, data = start_state(task, seed=seed, assets=assets, object_name=object_name)
         picture = draw(model, data, camera, height, width, engine="auto")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(picture).save(out)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray(picture).save(out)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror or error})") from None
     output.standard_output().print(f"picture: {out}", soft_wrap=True)

@@ -51,6 +51,7 @@ class Baseline:
         Raises:
           StageFailure: The baseline gives up; the stage says where.
         """
+        self.status = ""
         timestep = self._task.control_timestep
         planner = MotionPlanner(self._scene, self._arm, timestep, np.random.default_rng(seed))
         executor = Executor(self._senses, timestep)

@@ -24,7 +24,7 @@ class FreeMotionConfig:
     any joint [rad]; max_nodes: before giving up; shortcuts: tried on a found path."""
 
     step: float = 0.35
-    resolution: float = 0.04
+    resolution: float = 0.025
     max_nodes: int = 1500
     shortcuts: int = 80
 

@@ -23,7 +23,7 @@ from manipose_mj.control.planning_scene import (
     Clearance,
     PlanningScene,
 )
-from manipose_mj.control.trajectory import Timing, timed
+from manipose_mj.control.trajectory import Timing, timed, tracked
 from manipose_mj.poses import (
     SymmetryGroup,
     compose,
@@ -36,11 +36,12 @@ from manipose_mj.poses import (
 # Heights from which an object is lowered to its place, best first [m].
 _DESCENTS = (0.10, 0.06, 0.03)
 # How far to back off after letting go, best first [m]; the last must do.
-RETREATS = (0.12, 0.09, 0.06)
+RETREATS = (0.12, 0.18, 0.09, 0.06)
 HANDLE_RETREATS = (0.10, 0.07, 0.045)
 _MAX_PLACES = 8
 # Of every so many control steps one is checked for collision.
 _CHECK_EVERY = 4
+_CHECK_RESOLUTION = 0.02  # of free paths, in any joint [rad]
 # From its support on which a carried thing must be free [m].
 _SUPPORT_DISTANCE = 0.02
 _SPEED_SHARES = (1.0, 0.5, 0.25, 0.1)
@@ -112,19 +113,20 @@ class MotionPlanner:
 
         Keeps as far from everything as the two ends allow.
         """
-        for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING)):
+        for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
             if any(self.collides(q, clearance=wide, carried=carried) for q in (start, goal)):
                 continue
             with self.scene.query(clearance=wide, carried=carried) as scene:
                 path = plan_path(start, goal, scene.in_collision, self._rng)
             if path is None:
                 return None
-            # Rounding the corners leaves the path that was checked; slower leaves it less.
+            # Rounded corners leave the path that was checked; slower motions leave it less.
             with self.scene.query(clearance=close, carried=carried) as scene:
                 for share in _SPEED_SHARES:
                     timing = replace(self._timing, speed=share * self._timing.speed)
                     targets = timed(path, self._timestep, timing)
-                    if not any(scene.in_collision(q) for q in targets[::_CHECK_EVERY]):
+                    driven = _thinned(tracked(targets, self._timestep))
+                    if not any(scene.in_collision(q) for q in driven):
                         return targets
         return None
 
@@ -264,6 +266,14 @@ class MotionPlanner:
                     if scene.in_collision(q):
                         return None
         return targets
+
+
+def _thinned(path: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "k 7"]:
+    """Configurations of a path, no joint of neighbours further apart than the path's own steps or
+    than the resolution of collision checks [rad]."""
+    travelled = np.concatenate([[0.0], np.abs(np.diff(path, axis=0)).max(axis=1).cumsum()])
+    _, first = np.unique(np.floor(travelled / _CHECK_RESOLUTION), return_index=True)
+    return path[first]
 
 
 def joint_motion(part: PartBelief, position: float) -> Float[np.ndarray, "4 4"]:

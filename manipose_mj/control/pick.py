@@ -27,6 +27,8 @@ from manipose_mj.poses import invert, rotation_angle
 
 _STANDOFFS = (0.10, 0.06)
 # Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
+# A grasp this far from the label's origin [m] counts as one unit worse than one at it.
+_LEVER = 0.08
 _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
@@ -185,7 +187,9 @@ def _with_destination(
     label_tcp = invert(thing.label_pose) @ tcp_starts
     tcp_goals = (goals[None] @ label_tcp[:, None]).reshape(-1, 4, 4)
     owner = np.repeat(np.arange(len(free.index)), len(goals))
-    promise = _promise(tcp_starts[owner], tcp_goals) + owner / len(free.index)
+    lever = np.linalg.norm(label_tcp[:, :3, 3], axis=1)
+    effort = (owner / len(free.index)) + lever[owner] / _LEVER
+    promise = _promise(tcp_starts[owner], tcp_goals) + effort
     likely = np.argsort(promise, kind="stable")[:_MAX_PAIRS]
     owner, tcp_goals, promise = owner[likely], tcp_goals[likely], promise[likely]
     starts = free.joints[owner]

@@ -14,13 +14,15 @@ from manipose_mj.control.grasp_candidates import OPENING_MARGIN
 from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
-from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
+from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, carried_free_body
 from manipose_mj.mjcf.panda import MAX_OPENING
 from manipose_mj.poses import invert, rotation_angle
 
 # Past this the thing in the hand is not where the grasp put it.
 _LOST_DISTANCE = 0.04
 _LOST_ANGLE = 0.6
+_SLIP_DISTANCE = 0.002
+_SLIP_ANGLE = 0.02
 # Of a part's joint from where it should have gone, as a share of its range.
 _OPENING_TOLERANCE = 0.12
 _LIFTS = (0.10, 0.06, 0.03)
@@ -88,6 +90,7 @@ class Primitives:
     def _retreat(self, belief: Belief, name: str) -> Float[np.ndarray, "t 7"]:
         thing = belief.parts.get(name) or belief.objects[name]
         clearance = replace(CONTACT, arm=0.0)
+        found = None
         for distance in HANDLE_RETREATS if name in belief.parts else RETREATS:
             line = self._planner.line(
                 belief.joints,
@@ -96,9 +99,13 @@ class Primitives:
                 target=thing.geoms,
                 touched=frozenset({self._planner.body_name(thing.body)}),
             )
-            if line is not None:
+            # Where the next motion starts there should be room for it.
+            if line is not None and not self._planner.collides(line[-1], clearance=TRANSIT):
                 return line
-        raise StageFailure("release", f"no way to back off from {name}")
+            found = line if found is None else found
+        if found is None:
+            raise StageFailure("release", f"no way to back off from {name}")
+        return found
 
     def _move_object(self, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -114,7 +121,18 @@ class Primitives:
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
         yield from self._executor.follow(free)
-        self._check_held(self._executor.perceive(), name)
+        belief = self._executor.perceive()
+        now = self._check_held(belief, name)
+        if _moved(pose_tcp, now):
+            carried = self._carried(belief, name)
+            symmetry = thing.label.symmetry
+            place = self._planner.place(now, step.poses, symmetry, carried, belief.joints)
+            if place is None:
+                raise StageFailure("plan", f"{name} slipped, no way to set it down as it is now")
+            free = self._planner.free_path(belief.joints, place.above, carried=carried)
+            if free is None:
+                raise StageFailure("plan", f"{name} slipped, no path to where it should go")
+            yield from self._executor.follow(free)
         yield from self._executor.follow(place.descent)
 
     def _lift(self, name: str) -> Float[np.ndarray, "t 7"]:
@@ -178,6 +196,12 @@ class Primitives:
                 "grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand"
             )
         return now
+
+
+def _moved(a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"]) -> bool:
+    """Whether a thing has slipped in the hand by more than a descent should ignore."""
+    shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
+    return shift > _SLIP_DISTANCE or float(rotation_angle(a[:3, :3], b[:3, :3])) > _SLIP_ANGLE
 
 
 def _raised(pose: Float[np.ndarray, "4 4"], height: float) -> Float[np.ndarray, "4 4"]:

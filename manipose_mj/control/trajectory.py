@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 from manipose_mj.mjcf.panda_kinematics import VELOCITY_LIMITS
+
+SERVO_LAG = 0.084  # the arm's servos reach 63 % of a step in this time [s]
 
 
 @dataclass(frozen=True)
@@ -49,3 +52,9 @@ def timed(
     targets = np.stack([np.interp(times, knots, column) for column in path.T], axis=1)
     smooth = gaussian_filter1d(targets, timing.smoothing / timestep, axis=0, mode="nearest")
     return np.concatenate([smooth, path[-1:]])
+
+
+def tracked(targets: Float[np.ndarray, "t 7"], timestep: float) -> Float[np.ndarray, "t 7"]:
+    """Where the arm is while it is sent `targets`: the servos follow as a first-order lag."""
+    keep = float(np.exp(-timestep / SERVO_LAG))
+    return lfilter([1 - keep], [1, -keep], targets, axis=0, zi=keep * targets[:1])[0]

@@ -53,7 +53,7 @@ def _histogram(values: list[list[float]], label: str, limit: float) -> str:
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": label, "font.size": 10}):
         figure = Figure(figsize=(4.6, 2.3), layout="constrained")
         axes = figure.add_subplot()
-        axes.hist(clipped, bins=bins, stacked=True, color=[GOOD, BAD], rwidth=0.9)
+        axes.hist(clipped, bins=bins.tolist(), stacked=True, color=[GOOD, BAD], rwidth=0.9)
         axes.axvline(limit, color=INK, linewidth=1, linestyle=(0, (4, 3)))
         axes.set_xlim(0, edge)
         axes.set_xlabel(label, color=INK)

@@ -80,9 +80,8 @@ def write_report(out: Path, *, jobs: int = 1, scene: Scene = simulated) -> Path:
     ordered = sorted(results, key=lambda r: r.key)
     tasks = {task: list(group) for task, group in groupby(ordered, key=lambda r: r.task)}
     films = [film for group in tasks.values() for film in choose(group)]
-    drawn = joblib.Parallel(n_jobs=max(1, min(jobs, len(films))), batch_size=1)(
-        joblib.delayed(_drawn)(film, out, summary, scene) for film in films
-    )
+    pool: Any = joblib.Parallel(n_jobs=max(1, min(jobs, len(films))))
+    drawn = pool(joblib.delayed(_drawn)(film, out, summary, scene) for film in films)
     html = environment.get_template("report_template.html").render(
         summary=summary,
         sections=[

@@ -200,12 +200,9 @@ def _outcomes(
 
     # One thread per worker: else every worker's BLAS takes all cores, and sums change their order.
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
-        pool = joblib.Parallel(
-            n_jobs=min(config.jobs, len(episodes)),
-            return_as="generator_unordered",
-            batch_size=1,
-            pre_dispatch="2*n_jobs",
-        )
+        # Batches would hold finished episodes back.
+        options: Any = {"return_as": "generator_unordered", "batch_size": 1}
+        pool: Any = joblib.Parallel(n_jobs=min(config.jobs, len(episodes)), **options)
         outcomes = pool(joblib.delayed(run_one)(config, runner, *key) for key in episodes)
     try:
         yield from outcomes

@@ -31,7 +31,9 @@ class TableArena(composer.Arena):
         super()._build(name=name)
         root = self._mjcf_root
         _set_physics_options(root)
-        root.visual.headlight.set_attributes(ambient=[0.35] * 3, diffuse=[0.3] * 3, specular=[0.1] * 3)
+        root.visual.headlight.set_attributes(
+            ambient=[0.35] * 3, diffuse=[0.3] * 3, specular=[0.1] * 3
+        )
         root.visual.map.set_attributes(znear=0.01, zfar=50.0)
         getattr(root.visual, "global").set_attributes(offwidth=1280, offheight=960)
         world = root.worldbody

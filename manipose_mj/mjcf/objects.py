@@ -58,7 +58,9 @@ class ArticulatedObject(composer.Entity):
 
     def _build(self, asset: Asset, name: str | None = None) -> None:
         if asset.kind != "articulated":
-            raise InputError(f"{asset.folder}: is a {asset.kind} asset; expected an articulated one")
+            raise InputError(
+                f"{asset.folder}: is a {asset.kind} asset; expected an articulated one"
+            )
         self.asset = asset
         self._mjcf_root = mjcf.from_path(str(asset.model_path))
         self._mjcf_root.model = name or asset.name
@@ -102,7 +104,9 @@ class ArticulatedObject(composer.Entity):
         """Points in the frame of the part's cavity: centred, axes of the object, [m]."""
         cavity = self.asset.part(part).cavity
         if cavity is None:
-            raise InputError(f"{self.asset.folder}: part {part!r} has no cavity to store anything in")
+            raise InputError(
+                f"{self.asset.folder}: part {part!r} has no cavity to store anything in"
+            )
         carrier = (
             self.part_pose(physics, part) if cavity.moves_with_part else self.base_pose(physics)
         )

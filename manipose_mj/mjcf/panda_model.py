@@ -158,16 +158,18 @@ def _add_hand(model: mjcf.RootElement) -> None:
 
 def _add_collision(model: mjcf.RootElement) -> None:
     for body, capsules in geometry.CAPSULES.items():
-        for ends, radius in capsules:
+        for i, (ends, radius) in enumerate(capsules):
             shape = {"type": "capsule", "fromto": ends, "size": (radius,)}
-            model.find("body", body).add("geom", dclass="collision", **shape)
+            name = f"{body}_capsule_{i}"
+            model.find("body", body).add("geom", name=name, dclass="collision", **shape)
     for body, boxes in geometry.BOXES.items():
-        for box in boxes:
-            model.find("body", body).add("geom", dclass="collision", **_box(*box))
+        for i, box in enumerate(boxes):
+            name = f"{body}_box_{i}"
+            model.find("body", body).add("geom", name=name, dclass="collision", **_box(*box))
     for finger in ("left_finger", "right_finger"):
         body = model.find("body", finger)
-        for box in geometry.FINGER_BOXES:
-            body.add("geom", dclass="collision", **_box(*box))
+        for i, box in enumerate(geometry.FINGER_BOXES):
+            body.add("geom", name=f"{finger}_box_{i}", dclass="collision", **_box(*box))
         body.add("geom", name=f"{finger}_pad", dclass="pad", **_box(*geometry.PAD_BOX))
     for body1, body2 in _EXCLUDED:
         model.contact.add("exclude", body1=body1, body2=body2)

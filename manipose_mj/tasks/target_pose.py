@@ -49,8 +49,9 @@ class TargetPose(ManipulationTask):
         super().__init__(self.task_config)
         self._pairs = [_pose_pairs(asset, self.task_config) for asset in assets]
         self._objects = [RigidObject(asset, name=f"object_{i}") for i, asset in enumerate(assets)]
-        for entity in self._objects:
-            self._arena.add_free_entity(entity)
+        for index, entity in enumerate(self._objects):
+            # Parked in the model too: objects that begin in one place would burst apart.
+            self._arena.add_free_entity(entity).pos = _parking_place(index)
             for body in entity.mjcf_model.find_all("body"):
                 body.gravcomp = 1
         self._instances.update({e.mjcf_model.model: e for e in self._objects})
@@ -86,8 +87,7 @@ class TargetPose(ManipulationTask):
         self._active = int(random_state.randint(len(self._objects)))
         for index, entity in enumerate(self._objects):
             active = index == self._active
-            parked = compose(np.eye(3), np.array([index, 0.0, PARKING_DEPTH]))
-            entity.place(physics, parked)
+            entity.place(physics, compose(np.eye(3), _parking_place(index)))
             physics.bind(entity.mjcf_model.find_all("body")).gravcomp = 0.0 if active else 1.0
         asset = self.object.asset
         pairs = self._pairs[self._active]
@@ -128,6 +128,11 @@ class TargetPose(ManipulationTask):
             self.object.label_pose(physics), self._goal, self.object.asset.label.symmetry
         )
         return float(translation), float(rotation)
+
+
+def _parking_place(index: int) -> Float[np.ndarray, "3"]:
+    """Where an object waits that the episode does not use [m]."""
+    return np.array([float(index), 0.0, PARKING_DEPTH])
 
 
 def pose_on_table(
