@@ -196,10 +196,10 @@ class MotionPlanner:
             return None
         # What is let go stays behind: only the arm has to get away.
         back = self.backed_off(joints, RETREATS[-1])
-        left_behind = Carried(carried.geoms, lambda qpos, tcp_pose: None)
+        let_go = replace(CONTACT, target=-np.inf)
         with self.scene.query(clearance=CONTACT, carried=carried) as scene:
             scene.first_collision(joints)  # puts what is carried in its place
-            if self.line(joints, back, clearance=CONTACT, carried=left_behind) is None:
+            if self.line(joints, back, clearance=let_go, target=carried.geoms) is None:
                 return None
         for height in _DESCENTS:
             above = self.tcp_pose(joints)
