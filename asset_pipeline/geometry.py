@@ -46,7 +46,9 @@ class Shape:
             mesh = trimesh.creation.cylinder(self.size[0], 2 * self.size[1], sections=sections)
         elif self.kind == "capsule":
             count = (sections, sections)
-            mesh = trimesh.creation.capsule(height=2 * self.size[1], radius=self.size[0], count=count)
+            mesh = trimesh.creation.capsule(
+                height=2 * self.size[1], radius=self.size[0], count=count
+            )
             mesh.apply_translation(-mesh.bounds.mean(axis=0))
         else:
             mesh = trimesh.creation.icosphere(subdivisions=3)

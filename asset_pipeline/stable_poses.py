@@ -24,6 +24,8 @@ MIN_PROBABILITY = 0.01
 # Facets of a curved side are nearer to each other than this; faces of a box are not.
 MERGE_ANGLE = np.deg2rad(12.0)
 MIN_DEPTH = 1e-9  # of the centre of mass in the hull; on its face nothing is stable [m]
+MAX_SPEED = 0.01  # of a body at rest [m/s]
+MAX_SPIN = 0.1  # [rad/s]
 MAX_TILT = np.deg2rad(5.0)
 SETTLE_TIME = 1.5
 TIMESTEP = 0.002
@@ -71,16 +73,17 @@ def stable_poses(
 def verified(
     poses: Sequence[StablePose], body: Body, *, label: PoseLabel | None = None
 ) -> tuple[StablePose, ...]:
-    """Those of `poses` in which the body still stands after 1.5 s of MuJoCo, renormalised.
+    """Those of `poses` in which the body stands still after 1.5 s of MuJoCo, renormalised.
 
-    A pose fails when the body's up has tilted by more than 5 degrees, symmetries apart.
+    A pose fails when the body's up has tilted by more than 5 degrees, symmetries apart, or when it
+    still rolls.
 
     Raises:
       InputError: None of them stands.
     """
     model = _model(body)
     data = mujoco.MjData(model)
-    standing = [p for p in poses if _tilt_after_settling(model, data, p, label) < MAX_TILT]
+    standing = [p for p in poses if _stands(model, data, p, label)]
     if not standing:
         raise InputError(
             f"body {body.name!r} topples from every one of its {len(poses)} rest poses"
@@ -147,11 +150,15 @@ def _model(body: Body) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_path(str(path))
 
 
-def _tilt_after_settling(
+def _stands(
     model: mujoco.MjModel, data: mujoco.MjData, pose: StablePose, label: PoseLabel | None
-) -> float:
+) -> bool:
     mujoco.mj_resetData(model, data)
     data.qpos[:7] = pose_to_vector(pose.pose)
     for _ in range(int(SETTLE_TIME / TIMESTEP)):
         mujoco.mj_step(model, data)
-    return tilt(quaternion_to_rotation(data.qpos[3:7]), pose.rotation, label)
+    still = np.linalg.norm(data.qvel[:3]) < MAX_SPEED and np.linalg.norm(data.qvel[3:6]) < MAX_SPIN
+    return (
+        bool(still)
+        and tilt(quaternion_to_rotation(data.qpos[3:7]), pose.rotation, label) < MAX_TILT
+    )

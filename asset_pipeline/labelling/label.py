@@ -70,7 +70,9 @@ def symmetry_from_bop(
     turns = [np.eye(3)]
     for matrix in discrete:
         turn = rotation.T @ np.asarray(matrix, float).reshape(4, 4)[:3, :3] @ rotation
-        if abs(np.linalg.det(turn) - 1) > 1e-3 or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3):
+        if abs(np.linalg.det(turn) - 1) > 1e-3 or not np.allclose(
+            turn @ turn.T, np.eye(3), atol=1e-3
+        ):
             raise ValueError("a discrete symmetry is not a proper rotation")
         if rotation_angle(turn, np.eye(3)) > 1e-6:
             turns.append(turn)

@@ -44,7 +44,7 @@ _CHECK_EVERY = 4
 _CHECK_RESOLUTION = 0.02  # of free paths, in any joint [rad]
 # From its support on which a carried thing must be free [m].
 _SUPPORT_DISTANCE = 0.02
-_SPEED_SHARES = (1.0, 0.5, 0.25, 0.1)
+_SPEED_SHARES = (1.0, 0.5, 0.25)
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,12 @@ class MotionPlanner:
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
-        Keeps as far from everything as the two ends allow.
+        Keeps as far from everything as the start allows; the goal must have room around it.
         """
+        if self.collides(goal, clearance=TRANSIT, carried=carried):
+            return None
         for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
-            if any(self.collides(q, clearance=wide, carried=carried) for q in (start, goal)):
+            if self.collides(start, clearance=wide, carried=carried):
                 continue
             with self.scene.query(clearance=wide, carried=carried) as scene:
                 path = plan_path(start, goal, scene.in_collision, self._rng)
