@@ -11,7 +11,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from asset_pipeline.assets import Asset, list_assets, read_asset
-from asset_pipeline.emit import SOLIMP, SOLREF
+from asset_pipeline.rest_scene import rest_scene
 from asset_pipeline.stable_poses import tilt
 from manipose_mj.errors import InputError
 from manipose_mj.poses import pose_to_vector, quaternion_to_rotation
@@ -117,7 +117,7 @@ def check_asset(folder: Path) -> CheckResult:
     """Load one asset alone and judge it."""
     try:
         asset = read_asset(folder)
-        model = standing_model(asset)
+        model = rest_scene(asset.model_path, plane=asset.kind == "rigid")
     except InputError as error:
         return CheckResult(folder.name, (str(error),))
     except (ValueError, mujoco.FatalError) as error:  # MuJoCo's compiler
@@ -126,23 +126,6 @@ def check_asset(folder: Path) -> CheckResult:
     if asset.kind == "articulated":
         return _check_articulated(asset, model)
     return _check_rigid(asset, model)
-
-
-def standing_model(asset: Asset) -> mujoco.MjModel:
-    """The asset alone; a rigid one above a plane, an articulated one fixed in the air."""
-    spec = mujoco.MjSpec()
-    spec.option.timestep = 0.002
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 10.0
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    if asset.kind == "rigid":
-        plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1])
-        # MuJoCo averages the contact parameters of two geoms: the plane is as hard as a table is.
-        plane.condim, plane.solref = 4, np.fromstring(SOLREF, sep=" ")
-        plane.solimp[:3] = np.fromstring(SOLIMP, sep=" ")
-    child = mujoco.MjSpec.from_file(str(asset.model_path))
-    spec.attach(child, frame=spec.worldbody.add_frame(), prefix="asset/")
-    return spec.compile()
 
 
 def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:

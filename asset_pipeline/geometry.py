@@ -99,7 +99,8 @@ class Body:
       visual: What is seen.
       mass_properties: Mass, centre and inertia.
       joint: How it moves against the asset's base; None for the base and for rigid objects.
-      friction: MuJoCo's sliding, torsional and rolling friction; rolling is free where the last is 0.
+      friction: MuJoCo's sliding, torsional and rolling friction; without the last, round things never
+        come to rest.
     """
 
     name: str
@@ -107,7 +108,7 @@ class Body:
     visual: tuple[Shape, ...]
     mass_properties: MassProperties
     joint: Joint | None = None
-    friction: tuple[float, float, float] = (0.8, 0.005, 0.0)
+    friction: tuple[float, float, float] = (0.8, 0.005, 0.0005)
 
     def surface(self) -> trimesh.Trimesh:
         """All visual shapes as one mesh in the object frame."""

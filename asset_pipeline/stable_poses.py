@@ -17,6 +17,7 @@ from asset_pipeline.assets import StablePose
 from asset_pipeline.emit import model_element
 from asset_pipeline.geometry import Body
 from asset_pipeline.labelling.label import PoseLabel
+from asset_pipeline.rest_scene import TIMESTEP, rest_scene
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotation
 
@@ -28,7 +29,6 @@ MAX_SPEED = 0.01  # of a body at rest [m/s]
 MAX_SPIN = 0.1  # [rad/s]
 MAX_TILT = np.deg2rad(5.0)
 SETTLE_TIME = 1.5
-TIMESTEP = 0.002
 
 
 def stable_poses(
@@ -141,13 +141,9 @@ def _model(body: Body) -> mujoco.MjModel:
     """The body above a plane, from the same MJCF that its asset folder holds."""
     with tempfile.TemporaryDirectory() as folder:
         root = model_element(body.name, (replace(body, visual=()),), Path(folder))
-        ElementTree.SubElement(root, "option", timestep=str(TIMESTEP))
-        world = root.find("worldbody")
-        assert world is not None
-        ElementTree.SubElement(world, "geom", type="plane", size="0 0 0.1")
-        path = Path(folder) / "rest.xml"
+        path = Path(folder) / "model.xml"
         ElementTree.ElementTree(root).write(path, encoding="unicode")
-        return mujoco.MjModel.from_xml_path(str(path))
+        return rest_scene(path)
 
 
 def _stands(

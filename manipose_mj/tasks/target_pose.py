@@ -19,7 +19,7 @@ from manipose_mj.tasks.base import ManipulationTask, TaskConfig
 from manipose_mj.tasks.goals import PoseGoal
 from manipose_mj.tasks.success import pose_goal_met
 
-PARKING_DEPTH = -20.0
+PARKING_HEIGHT = 50.0
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class TargetPose(ManipulationTask):
     """Pick the object up and set it down at the goal, which is drawn as three axes.
 
     Start and goal are stable poses of the object, turned freely about the vertical. Objects that an
-    episode does not use wait far below the floor: a change of object needs no new model.
+    episode does not use wait high above the scene, weightless: a change of object needs no new model.
     """
 
     def __init__(self, assets: tuple[Asset, ...], config: TargetPoseConfig | None = None) -> None:
@@ -132,7 +132,7 @@ class TargetPose(ManipulationTask):
 
 def _parking_place(index: int) -> Float[np.ndarray, "3"]:
     """Where an object waits that the episode does not use [m]."""
-    return np.array([float(index), 0.0, PARKING_DEPTH])
+    return np.array([float(index), 0.0, PARKING_HEIGHT])
 
 
 def pose_on_table(
