@@ -36,6 +36,10 @@ class TableArena(composer.Arena):
         )
         root.visual.map.set_attributes(znear=0.01, zfar=50.0)
         getattr(root.visual, "global").set_attributes(offwidth=1280, offheight=960)
+        root.asset.add(
+            "texture", name="sky", type="skybox", builtin="gradient", width=64, height=384,
+            rgb1=[0.93, 0.95, 0.97], rgb2=[0.55, 0.62, 0.70],
+        )  # fmt: skip
         world = root.worldbody
         world.add(
             "light", name="key", pos=[0.8, -0.9, 2.2], dir=[-0.2, 0.45, -1], diffuse=[0.55] * 3,
