@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -342,11 +341,14 @@ def _label(path: Path, document: dict[str, Any], name: str) -> PoseLabel:
         symmetry = symmetry_from_bop(rotation, discrete, continuous)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path}: field '{name}.symmetries_*' is wrong: {error}") from None
+    extents = _array(path, document, "extents", (3,), f"{name}.extents")
+    if (extents <= 0).any():
+        raise InputError(f"{path}: field '{name}.extents' is not 3 positive lengths")
     return PoseLabel(
         origin=_array(path, document, "origin", (3,), f"{name}.origin"),
         rotation=rotation,
         object_type=object_type,  # pyright: ignore[reportArgumentType]
-        extents=_array(path, document, "extents", (3,), f"{name}.extents"),
+        extents=extents,
         symmetry=symmetry,
     )
 
@@ -401,6 +403,9 @@ def _part(path: Path, document: Any, index: int) -> MovingPart:
     if abs(np.linalg.norm(axis) - 1) > 1e-3:
         raise InputError(f"{path}: field '{name}.joint.axis' is not a unit vector")
     handle, cavity = document.get("handle"), document.get("cavity")
+    for key, value in (("handle", handle), ("cavity", cavity)):
+        if value is not None and not isinstance(value, dict):
+            raise InputError(f"{path}: field '{name}.{key}' is {value!r}; expected an object or null")
     return MovingPart(
         name=_field(path, document, "name", str, f"{name}.name"),
         joint=Joint(
@@ -426,8 +431,8 @@ def _read_grasps(path: Path, stable_poses: int) -> GraspSet | None:
     if not path.is_file():
         return None
     document = _read_json(path)
-    widths = np.asarray(_field(path, document, "widths", list), float)
-    count = len(widths)
+    count = len(_field(path, document, "widths", list))
+    widths = _array(path, document, "widths", (count,), "widths")
     rows = _array(path, document, "poses", (count, 12), "poses") if count else np.empty((0, 12))
     clear = _array(path, document, "clear", (count, stable_poses), "clear") if count else None
     poses = np.tile(np.eye(4), (count, 1, 1))

@@ -209,7 +209,7 @@ def _write(entry: Path, parts: list[trimesh.Trimesh]) -> None:
         entry.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=entry.parent, suffix=".part", delete=False) as file:
             staging = Path(file.name)
-            np.savez_compressed(file, **arrays)
+            np.savez_compressed(file, allow_pickle=False, **arrays)
         staging.replace(entry)  # atomic: another process sees all of it or nothing
     except OSError as error:
         log.warning("%s: cannot be written (%s); continuing without cache", entry, error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import tempfile
@@ -60,10 +61,8 @@ def _swap(staging: Path, folder: Path) -> None:
             if not folder.is_dir():
                 raise
             retired = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-            try:
+            with contextlib.suppress(FileNotFoundError):
                 os.rename(folder, retired / "old")
-            except FileNotFoundError:
-                pass
             shutil.rmtree(retired, ignore_errors=True)
 
 

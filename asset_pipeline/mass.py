@@ -86,7 +86,7 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
     if not parts:
         raise InputError("no parts to combine; expected at least one with mass")
     mass = sum(p.mass for p in parts)
-    center = sum(p.mass * p.center_of_mass for p in parts) / mass
+    center = np.sum([p.mass * p.center_of_mass for p in parts], axis=0) / mass
     moments = np.zeros((3, 3))
     for part in parts:
         offset = part.center_of_mass - center

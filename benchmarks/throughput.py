@@ -46,7 +46,8 @@ def main() -> None:
 
         camera = RayCamera(120, 160)
         camera.render(model, data, "front")
-        images = [_milliseconds(lambda: camera.render(model, data, "front")) for _ in range(IMAGES)]
+        draw = functools.partial(camera.render, model, data, "front")
+        images = [_milliseconds(draw) for _ in range(IMAGES)]
         print(
             f"| `{domain}/{task}` | {statistics.median(resets):.1f} | {stepped:,.0f} | {bare:,.0f} "
             f"| {statistics.median(images):.1f} |"

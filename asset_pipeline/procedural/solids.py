@@ -138,8 +138,8 @@ def print_on_cylinder(
 
 
 def box(
-    low: Float[np.ndarray, "3"],
-    high: Float[np.ndarray, "3"],
+    low: Float[np.ndarray, "3"] | tuple[float, float, float],
+    high: Float[np.ndarray, "3"] | tuple[float, float, float],
     rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0),
 ) -> Shape:
     """A box geom between two corners."""

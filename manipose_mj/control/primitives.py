@@ -11,7 +11,7 @@ from manipose_mj.control.belief import Belief, PartBelief
 from manipose_mj.control.executor import Actions, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import OPENING_MARGIN
-from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner
+from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner, Place
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
 from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, carried_free_body
@@ -21,8 +21,9 @@ from manipose_mj.poses import invert, rotation_angle
 # Past this the thing in the hand is not where the grasp put it.
 _LOST_DISTANCE = 0.04
 _LOST_ANGLE = 0.6
-_SLIP_DISTANCE = 0.002
-_SLIP_ANGLE = 0.02
+# How much slip in the hand calls for a new descent, and how much forbids the old one [m, rad].
+_SLIP = (0.002, 0.02)
+_BIG_SLIP = (0.01, 0.08)
 # Of a part's joint from where it should have gone, as a share of its range.
 _OPENING_TOLERANCE = 0.12
 _LIFTS = (0.10, 0.06, 0.03)
@@ -123,17 +124,26 @@ class Primitives:
         yield from self._executor.follow(free)
         belief = self._executor.perceive()
         now = self._check_held(belief, name)
-        if _moved(pose_tcp, now):
-            carried = self._carried(belief, name)
-            symmetry = thing.label.symmetry
-            place = self._planner.place(now, step.poses, symmetry, carried, belief.joints)
-            if place is None:
+        if _moved(pose_tcp, now, _SLIP):
+            again = self._placed_again(belief, name, step, now)
+            if again is not None:
+                free, place = again
+                yield from self._executor.follow(free)
+            elif _moved(pose_tcp, now, _BIG_SLIP):
                 raise StageFailure("plan", f"{name} slipped, no way to set it down as it is now")
-            free = self._planner.free_path(belief.joints, place.above, carried=carried)
-            if free is None:
-                raise StageFailure("plan", f"{name} slipped, no path to where it should go")
-            yield from self._executor.follow(free)
         yield from self._executor.follow(place.descent)
+
+    def _placed_again(
+        self, belief: Belief, name: str, step: Step, pose_tcp: Float[np.ndarray, "4 4"]
+    ) -> tuple[Float[np.ndarray, "t 7"], Place] | None:
+        """A short path and a descent for the thing as it lies in the hand now."""
+        carried = self._carried(belief, name)
+        symmetry = belief.objects[name].label.symmetry
+        place = self._planner.place(pose_tcp, step.poses, symmetry, carried, belief.joints)
+        if place is None:
+            return None
+        free = self._planner.free_path(belief.joints, place.above, carried=carried)
+        return None if free is None else (free, place)
 
     def _lift(self, name: str) -> Float[np.ndarray, "t 7"]:
         belief = self._executor.perceive()
@@ -198,10 +208,12 @@ class Primitives:
         return now
 
 
-def _moved(a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"]) -> bool:
-    """Whether a thing has slipped in the hand by more than a descent should ignore."""
+def _moved(
+    a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"], limit: tuple[float, float]
+) -> bool:
+    """Whether a thing has slipped in the hand by more than a distance [m] or an angle [rad]."""
     shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
-    return shift > _SLIP_DISTANCE or float(rotation_angle(a[:3, :3], b[:3, :3])) > _SLIP_ANGLE
+    return shift > limit[0] or float(rotation_angle(a[:3, :3], b[:3, :3])) > limit[1]
 
 
 def _raised(pose: Float[np.ndarray, "4 4"], height: float) -> Float[np.ndarray, "4 4"]:
