@@ -405,7 +405,9 @@ def _part(path: Path, document: Any, index: int) -> MovingPart:
     handle, cavity = document.get("handle"), document.get("cavity")
     for key, value in (("handle", handle), ("cavity", cavity)):
         if value is not None and not isinstance(value, dict):
-            raise InputError(f"{path}: field '{name}.{key}' is {value!r}; expected an object or null")
+            raise InputError(
+                f"{path}: field '{name}.{key}' is {value!r}; expected an object or null"
+            )
     return MovingPart(
         name=_field(path, document, "name", str, f"{name}.name"),
         joint=Joint(

@@ -113,7 +113,7 @@ def fidelity(mesh: trimesh.Trimesh, parts: tuple[Shape, ...], *, samples: int = 
     """
     solid = closed(mesh) or weld(mesh)
     hulls = [part.surface() for part in parts]
-    points, _ = trimesh.sample.sample_surface(solid, samples, seed=0)
+    points = trimesh.sample.sample_surface(solid, samples, seed=0)[0]
     outside = points[np.min([_depth(h, points) for h in hulls], axis=0) > 0]
     gaps = (
         [trimesh.proximity.closest_point(h, outside)[1] for h in hulls] if len(outside) else [[0]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -46,7 +47,9 @@ def finish_rigid(
     Raises:
       InputError: The object has no volume or no pose in which it rests.
     """
-    touching = trimesh.util.concatenate([s.surface(SECTIONS) for s in body.collision])
+    touching = cast(
+        trimesh.Trimesh, trimesh.util.concatenate([s.surface(SECTIONS) for s in body.collision])
+    )
     poses = stable_poses(touching, body.mass_properties.center_of_mass, label=label)
     poses = verified(poses, body, label=label)
     grasps = sample_grasps(body, poses)

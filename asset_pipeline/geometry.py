@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 import trimesh
@@ -112,4 +112,4 @@ class Body:
 
     def surface(self) -> trimesh.Trimesh:
         """All visual shapes as one mesh in the object frame."""
-        return trimesh.util.concatenate([s.surface() for s in self.visual])
+        return cast(trimesh.Trimesh, trimesh.util.concatenate([s.surface() for s in self.visual]))

@@ -147,7 +147,11 @@ def _solid_moments(
     """Volume, centre and second moments about it, at unit density."""
     middle = mesh.bounds.mean(axis=0)  # integrals about a far origin would cancel
     found = trimesh.triangles.mass_properties(mesh.triangles - middle, density=1.0)
-    return float(found.volume), found.center_mass + middle, second_moments(found.inertia)
+    return (
+        float(found.volume),
+        found.center_mass + middle,
+        second_moments(np.asarray(found.inertia)),
+    )
 
 
 def _hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -58,7 +59,7 @@ def union_points(shapes: Sequence[Shape], rng: np.random.Generator) -> SurfacePo
       rng: Draws the points.
     """
     meshes = [s.surface() for s in shapes]
-    cloud = surface_points(trimesh.util.concatenate(meshes), rng)
+    cloud = surface_points(cast(trimesh.Trimesh, trimesh.util.concatenate(meshes)), rng)
     if len(meshes) == 1:
         return cloud
     outside = np.ones(len(cloud.points), bool)

@@ -5,6 +5,7 @@ python benchmarks/throughput.py
 
 from __future__ import annotations
 
+import functools
 import platform
 import statistics
 import time

@@ -69,7 +69,7 @@ def register_suite() -> None:
         tasks = containers.TaggedTasks()
         for name in [name for other, name in ALL_TASKS if other == domain]:
             tasks.add(*task_spec(domain, name).tags)(_suite_factory(domain, name))
-        module = types.ModuleType(f"{__name__}.{domain}")
+        module: Any = types.ModuleType(f"{__name__}.{domain}")
         module.SUITE = tasks
         dm_suite._DOMAINS[domain] = module
     ours = tuple(task for task in ALL_TASKS if task not in dm_suite.ALL_TASKS)

@@ -25,9 +25,7 @@ GROUPS = {
         np.stack([rotation_about(X, np.pi / 2), np.diag([-1.0, 1.0, -1.0])])
     ),
 }
-quaternions = arrays(float, 4, elements=st.floats(-1, 1)).filter(
-    lambda q: np.linalg.norm(q) > 1e-2
-)
+quaternions = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 1e-2)
 vectors = arrays(float, 3, elements=st.floats(-10, 10))
 
 
@@ -179,9 +177,7 @@ def test_batches_have_the_shape_and_values_of_single_poses(name, shape):
         assert both[1][index] == pytest.approx(float(single[1]))
     assert poses.invert(truth).shape == (*shape, 4, 4)
     assert poses.pose_to_vector(truth).shape == (*shape, 7)
-    np.testing.assert_allclose(
-        poses.vector_to_pose(poses.pose_to_vector(truth)), truth, atol=1e-12
-    )
+    np.testing.assert_allclose(poses.vector_to_pose(poses.pose_to_vector(truth)), truth, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", GROUPS)

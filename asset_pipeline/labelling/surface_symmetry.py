@@ -42,7 +42,7 @@ class SurfaceProbe:
     @classmethod
     def of(cls, mesh: trimesh.Trimesh) -> SurfaceProbe:
         """Sample a mesh; deterministic."""
-        points, faces = trimesh.sample.sample_surface(mesh, DENSE, seed=0)
+        points, faces = trimesh.sample.sample_surface(mesh, DENSE, seed=0)[:2]
         points = np.asarray(points)
         tolerance = max(NOISE, TOLERANCE * float(np.linalg.norm(mesh.extents)))
         return cls(points, np.asarray(mesh.face_normals)[faces], cKDTree(points), tolerance)

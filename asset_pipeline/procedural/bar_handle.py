@@ -50,7 +50,7 @@ def bar_handle(
     reach = np.full(3, half)
     reach[along] = handle.length / 2
     bar = (middle - reach, middle + reach)
-    posts = []
+    posts: list[tuple[np.ndarray, np.ndarray]] = []
     for sign in (-1.0, 1.0):
         centre = middle.copy()
         centre[along] += sign * (handle.length / 2 - handle.inset)

@@ -50,7 +50,7 @@ class ArmModel:
         """Geoms around the robot, but those of bodies that the motion may touch."""
         return [
             geom
-            for geom in np.flatnonzero(~self.robot_geoms)
+            for geom in np.flatnonzero(~self.robot_geoms).tolist()
             if self.model.body(self.model.geom_bodyid[geom]).name not in touched_bodies
         ]
 

@@ -14,6 +14,7 @@ from manipose_mj.poses import compose, rotation_about
 
 # How much further than the object the gripper is open on approach, in all [m].
 OPENING_MARGIN = 0.012
+MIN_CLEARANCE = 0.003  # between the open gripper and what it takes, in all [m]
 # Of the approach to a handle, about its long axis [rad], and along it [m].
 HANDLE_TILTS = (0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79)
 HANDLE_SLIDES = (0.0, 0.025, -0.025)
@@ -43,10 +44,11 @@ class Grasps:
 
 
 def object_grasps(thing: ObjectBelief) -> Grasps:
-    """The annotated grasps and their half turns about the approach, where the object is."""
-    own = thing.pose @ thing.grasps.poses
+    """The annotated grasps that are narrow enough, and their half turns about the approach."""
+    narrow = thing.grasps.widths <= MAX_OPENING - MIN_CLEARANCE
+    own = thing.pose @ thing.grasps.poses[narrow]
     both = np.stack([own, own @ _HALF_TURN], axis=1).reshape(-1, 4, 4)
-    return Grasps(both, np.repeat(thing.grasps.widths, 2))
+    return Grasps(both, np.repeat(thing.grasps.widths[narrow], 2))
 
 
 def handle_grasps(part: PartBelief) -> Grasps:

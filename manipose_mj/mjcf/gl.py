@@ -14,6 +14,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from manipose_mj.errors import InputError, unknown_name
 
@@ -138,7 +139,7 @@ def activate() -> str:
     if backend != "glfw" and "OpenGL" not in sys.modules:
         os.environ["PYOPENGL_PLATFORM"] = backend
     # `import mujoco` chose a platform before we could; the renderer looks the class up when made.
-    chooser = importlib.import_module("mujoco.rendering.classic.gl_context")
+    chooser: Any = importlib.import_module("mujoco.rendering.classic.gl_context")
     platform = importlib.import_module(f"mujoco.{backend}")
     if getattr(chooser, "GLContext", None) is not platform.GLContext:
         _log.info("rendering with %s", backend)

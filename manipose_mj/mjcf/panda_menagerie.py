@@ -30,7 +30,7 @@ def find_menagerie_panda() -> Path | None:
     if root := os.environ.get("MENAGERIE_ROOT"):
         folder = Path(root) / _ROBOT
     elif importlib.util.find_spec("mujoco_menagerie"):
-        import mujoco_menagerie
+        import mujoco_menagerie  # pyright: ignore[reportMissingImports]
 
         cache, robot = mujoco_menagerie.Cache(), mujoco_menagerie.get(_ROBOT)
         if not cache.is_cached(robot):

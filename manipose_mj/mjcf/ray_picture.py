@@ -131,7 +131,9 @@ class RayPainter:
                 normal = hits.normal[rows].astype(np.float32)
                 colour = self._shade(data, points, normal, -unit[rows], geom_id, turn[rows])
                 haze = 1 - np.exp(-np.sum(distance**2, axis=1, keepdims=True) / _FOG_DISTANCE**2)
-                colour += haze.astype(np.float32) * (np.float32(self._look.horizon) - colour)
+                colour += haze.astype(np.float32) * (
+                    np.array(self._look.horizon, np.float32) - colour
+                )
                 picture[rows] += cover[geom_id, None] * (colour - picture[rows])
         return to_display(_tone(picture))
 
@@ -155,7 +157,9 @@ class RayPainter:
         key[facing] *= self._lit(data, light, raised, turn[facing])
         key = key[:, None]
         up = 0.5 + 0.5 * normals[:, 2:]
-        around = np.float32(look.ground) + up * (np.float32(look.sky) - np.float32(look.ground))
+        around = np.array(look.ground, np.float32) + up * (
+            np.array(look.sky, np.float32) - np.array(look.ground, np.float32)
+        )
         towards = np.maximum(np.einsum("ij,ij->i", normals, to_eye), 0.0)[:, None]
         light_sum = look.key * key + around + look.camera_light * towards
         halfway = to_light + to_eye
@@ -200,7 +204,10 @@ class RayPainter:
 
     def _sky(self, unit: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         height = np.clip(unit[:, 2:], 0.0, 1.0) ** np.float32(0.6)
-        horizon, zenith = np.float32(self._look.horizon), np.float32(self._look.zenith)
+        horizon, zenith = (
+            np.array(self._look.horizon, np.float32),
+            np.array(self._look.zenith, np.float32),
+        )
         return horizon + height * (zenith - horizon)
 
 

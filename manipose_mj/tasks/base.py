@@ -139,10 +139,13 @@ class ManipulationTask(composer.Task):
         action: Float[np.ndarray, "8"],
         random_state: np.random.RandomState,
     ) -> None:
-        action = np.asarray(action, float)
+        try:
+            action = np.asarray(action, float)
+        except (TypeError, ValueError):
+            action = np.empty(0)
         if action.shape != (8,) or not np.isfinite(action).all():
             raise InputError(
-                f"action has shape {action.shape} and values {action}; "
+                f"action has shape {action.shape} and values {action.ravel()[:8].tolist()}; "
                 "expected 8 finite numbers: seven joint targets [rad] and an opening [m]"
             )
         self.robot.apply_targets(physics, action[:7], float(action[7]))

@@ -45,6 +45,8 @@ class TargetPose(ManipulationTask):
     """
 
     def __init__(self, assets: tuple[Asset, ...], config: TargetPoseConfig | None = None) -> None:
+        if not assets:
+            raise InputError("target_pose takes at least one object; got none")
         self.task_config = config or TargetPoseConfig()
         super().__init__(self.task_config)
         self._pairs = [_pose_pairs(asset, self.task_config) for asset in assets]

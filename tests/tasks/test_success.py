@@ -14,7 +14,6 @@ X, Y, Z = np.eye(3)
 TOLERANCE = Tolerance()
 
 
-
 @pytest.fixture(params=["numpy", "jax"])
 def asarray(request):
     if request.param == "numpy":

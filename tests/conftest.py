@@ -1,0 +1,15 @@
+"""What every test runs under: one thread a process, and built objects kept out of the user's home."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+# Before NumPy loads: xdist gives every core a worker, and threads on top only slow each other down.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+# Shared by the workers and kept between runs, so that objects are built once.
+os.environ.setdefault(
+    "MANIPOSE_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "manipose-mj")
+)
