@@ -16,7 +16,8 @@ from typing import Literal
 import numpy as np
 from joblib import Parallel, delayed
 
-from asset_pipeline.assets import Asset, read_asset
+from asset_pipeline.asset_json import read_asset
+from asset_pipeline.assets import Asset
 from asset_pipeline.convexify import ConvexSettings, convexify
 from asset_pipeline.finish import finish_rigid
 from asset_pipeline.geometry import Body, MassProperties, Shape

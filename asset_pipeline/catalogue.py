@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from asset_pipeline.assets import ASSET_FILE, Asset, Provenance, read_asset
+from asset_pipeline.asset_json import read_asset
+from asset_pipeline.assets import ASSET_FILE, Asset, Provenance
 from asset_pipeline.emit import write_asset
 from asset_pipeline.finish import finish_rigid
 from asset_pipeline.labelling.label import ObjectType

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 from joblib import Parallel, delayed
 
-from asset_pipeline.assets import Asset, list_assets, read_asset
+from asset_pipeline.asset_json import list_assets, read_asset
+from asset_pipeline.assets import Asset
 from asset_pipeline.rest_scene import rest_scene
 from asset_pipeline.stable_poses import tilt
 from manipose_mj.errors import InputError

@@ -13,7 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 import trimesh
 
-from asset_pipeline.assets import MODEL_FILE, Asset, read_asset, write_asset_json
+from asset_pipeline.asset_json import read_asset, write_asset_json
+from asset_pipeline.assets import MODEL_FILE, Asset
 from asset_pipeline.geometry import Body, MassProperties, Shape
 from manipose_mj.poses import pose_to_vector
 

@@ -18,7 +18,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from asset_pipeline.assets import Asset, list_assets, read_asset
+from asset_pipeline.asset_json import list_assets, read_asset
+from asset_pipeline.assets import Asset
 from asset_pipeline.gripper import ParallelJaw
 from manipose_mj.poses import invert, pose_to_vector, quaternion_to_rotation, rotation_angle
 

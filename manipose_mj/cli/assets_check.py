@@ -67,7 +67,8 @@ def check_assets(
 
 def _unreadable(directory: Path, result) -> str:
     """Why the folder of a failed result is no asset; empty if it is one."""
-    from asset_pipeline.assets import ASSET_FILE, read_asset
+    from asset_pipeline.asset_json import read_asset
+    from asset_pipeline.assets import ASSET_FILE
 
     if result.ok:
         return ""

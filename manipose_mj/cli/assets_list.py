@@ -27,7 +27,7 @@ def list_objects(
       directory: Folder of assets; without it the built-in objects, which the first time takes a minute.
       json: Print JSON, for other programs.
     """
-    from asset_pipeline.assets import list_assets, read_asset
+    from asset_pipeline.asset_json import list_assets, read_asset
     from manipose_mj.cli import output
     from manipose_mj.cli.builtin_objects import all_names, load_objects
 

@@ -24,7 +24,8 @@ def show_asset(
       folder: The asset's folder.
       json: Print the content of its asset.json, once checked, for other programs.
     """
-    from asset_pipeline.assets import ASSET_FILE, read_asset
+    from asset_pipeline.asset_json import read_asset
+    from asset_pipeline.assets import ASSET_FILE
     from manipose_mj.cli import output
 
     asset = read_asset(folder)

@@ -84,7 +84,7 @@ def run_and_report(config, *, resume: bool) -> int:
 
 def check_names(tasks: tuple[str, ...], assets: Path | None, object_name: str | None) -> None:
     """Find misspelt names before anything is written."""
-    from asset_pipeline.assets import list_assets
+    from asset_pipeline.asset_json import list_assets
     from manipose_mj.cli.builtin_objects import all_names
     from manipose_mj.suite import ALL_TASKS
 

@@ -11,7 +11,8 @@ import numpy as np
 from dm_control import composer
 from dm_control.rl.control import PhysicsError
 
-from asset_pipeline.assets import Asset, list_assets, read_asset
+from asset_pipeline.asset_json import list_assets, read_asset
+from asset_pipeline.assets import Asset
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.failure import StageFailure

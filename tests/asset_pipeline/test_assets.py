@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from asset_pipeline import assets as assets_module
-from asset_pipeline import emit
+from asset_pipeline import asset_json, emit
+from asset_pipeline.asset_json import list_assets, read_asset
 from asset_pipeline.assets import (
     ASSET_FILE,
     GRASPS_FILE,
@@ -24,8 +24,6 @@ from asset_pipeline.assets import (
     MovingPart,
     Provenance,
     StablePose,
-    list_assets,
-    read_asset,
 )
 from asset_pipeline.emit import write_asset
 from asset_pipeline.geometry import Body, Joint, MassProperties, Shape
@@ -297,7 +295,7 @@ def test_a_write_that_fails_leaves_the_old_folder_and_nothing_else(tmp_path, mon
         raise OSError(28, "No space left on device")
 
     if fails == "asset.json":
-        monkeypatch.setattr(assets_module, "_write_json", full)
+        monkeypatch.setattr(asset_json, "write_json", full)
     elif fails == "model":
         monkeypatch.setattr(emit, "model_element", full)
     else:

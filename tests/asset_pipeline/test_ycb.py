@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asset_pipeline import build as build_module
-from asset_pipeline.assets import read_asset
+from asset_pipeline.asset_json import read_asset
 from asset_pipeline.build import build
 from asset_pipeline.check import check
 from asset_pipeline.scan import load_scan_mesh

@@ -1,0 +1,280 @@
+"""Writing and reading `asset.json` and `grasps.json`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asset_pipeline.assets import (
+    ASSET_FILE,
+    GRASPS_FILE,
+    MODEL_FILE,
+    SCHEMA_VERSION,
+    Asset,
+    Cavity,
+    GraspSet,
+    MovingPart,
+    Provenance,
+    StablePose,
+)
+from asset_pipeline.geometry import Joint, MassProperties
+from asset_pipeline.json_fields import (
+    array,
+    number,
+    positive,
+    read_json,
+    rounded,
+    typed,
+    unit_quaternion,
+    write_json,
+)
+from asset_pipeline.labelling.label import (
+    OBJECT_TYPES,
+    PoseLabel,
+    symmetry_from_bop,
+    symmetry_to_bop,
+)
+from manipose_mj.errors import InputError
+from manipose_mj.poses import quaternion_to_rotation, rotation_to_quaternion
+
+
+def write_asset_json(asset: Asset) -> None:
+    """Write `asset.json` and, where the asset has grasps, `grasps.json` into `asset.folder`."""
+    document: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "name": asset.name,
+        "kind": asset.kind,
+        "category": asset.category,
+        "units": {"length": "m", "mass": "kg", "angle": "rad"},
+        "up": rounded(asset.up),
+        "label": _label_to_json(asset.label),
+        "mass_properties": {
+            "mass": float(asset.mass_properties.mass),
+            "center_of_mass": rounded(asset.mass_properties.center_of_mass),
+            "inertia": np.asarray(asset.mass_properties.inertia, float).tolist(),
+        },
+        "stable_poses": [
+            {
+                "quaternion": rounded(rotation_to_quaternion(p.rotation)),
+                "height": float(p.height),
+                "probability": float(p.probability),
+            }
+            for p in asset.stable_poses
+        ],
+        "parts": [_part_to_json(p) for p in asset.parts],
+        "provenance": vars(asset.provenance),
+    }
+    write_json(asset.folder / ASSET_FILE, document)
+    if asset.grasps is not None:
+        grasps = {
+            "poses": rounded(asset.grasps.poses[:, :3, :4].reshape(-1, 12)),
+            "widths": rounded(asset.grasps.widths),
+            "clear": asset.grasps.clear.astype(int).tolist(),
+        }
+        write_json(asset.folder / GRASPS_FILE, grasps)
+
+
+def read_asset(folder: Path | str) -> Asset:
+    """Read and validate an asset folder.
+
+    Raises:
+      InputError: A file is missing or a field is wrong; the message names both.
+    """
+    folder = Path(folder)
+    path = folder / ASSET_FILE
+    document = read_json(path)
+    version = typed(path, document, "schema_version", int)
+    if version != SCHEMA_VERSION:
+        raise InputError(
+            f"{path}: field 'schema_version' is {version}; this release reads {SCHEMA_VERSION}"
+        )
+    kind = typed(path, document, "kind", str)
+    if kind not in ("rigid", "articulated"):
+        raise InputError(f"{path}: field 'kind' is {kind!r}; expected 'rigid' or 'articulated'")
+    if not (folder / MODEL_FILE).is_file():
+        raise InputError(f"{folder / MODEL_FILE}: missing; an asset folder needs its MJCF model")
+    mass = typed(path, document, "mass_properties", dict)
+    properties = MassProperties(
+        mass=positive(path, mass, "mass", "mass_properties.mass"),
+        center_of_mass=array(path, mass, "center_of_mass", (3,), "mass_properties.center_of_mass"),
+        inertia=array(path, mass, "inertia", (3, 3), "mass_properties.inertia"),
+    )
+    if np.linalg.eigvalsh(properties.inertia).min() <= 0:
+        raise InputError(f"{path}: field 'mass_properties.inertia' is not positive definite")
+    stable = tuple(
+        _stable_pose(path, entry, i)
+        for i, entry in enumerate(typed(path, document, "stable_poses", list))
+    )
+    parts = tuple(
+        _part(path, entry, i) for i, entry in enumerate(typed(path, document, "parts", list))
+    )
+    provenance = typed(path, document, "provenance", dict)
+    return Asset(
+        folder=folder,
+        name=typed(path, document, "name", str),
+        kind=kind,  # pyright: ignore[reportArgumentType]
+        category=typed(path, document, "category", str),
+        label=_label(path, typed(path, document, "label", dict), "label"),
+        up=array(path, document, "up", (3,), "up"),
+        mass_properties=properties,
+        stable_poses=stable,
+        provenance=Provenance(
+            source=typed(path, provenance, "source", str, "provenance.source"),
+            item=typed(path, provenance, "item", str, "provenance.item"),
+            licence=typed(path, provenance, "licence", str, "provenance.licence"),
+            inputs=typed(path, provenance, "inputs", dict, "provenance.inputs"),
+            generator=typed(path, provenance, "generator", str, "provenance.generator"),
+        ),
+        parts=parts,
+        grasps=_read_grasps(folder / GRASPS_FILE, len(stable)),
+    )
+
+
+def list_assets(directory: Path | str) -> list[Path]:
+    """The asset folders directly under `directory`, sorted by name.
+
+    Raises:
+      InputError: The directory does not exist or holds no asset.
+    """
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise InputError(f"{directory}: no such folder; expected a folder of built assets")
+    folders = sorted(p.parent for p in directory.glob(f"*/{ASSET_FILE}"))
+    if not folders:
+        raise InputError(f"{directory}: holds no asset folder (none with an {ASSET_FILE})")
+    return folders
+
+
+def _label_to_json(label: PoseLabel) -> dict[str, Any]:
+    return {
+        "object_type": label.object_type,
+        "origin": rounded(label.origin),
+        "rotation": rounded(label.rotation),
+        "extents": rounded(label.extents),
+        **symmetry_to_bop(label),
+    }
+
+
+def _label(path: Path, document: dict[str, Any], name: str) -> PoseLabel:
+    object_type = typed(path, document, "object_type", str, f"{name}.object_type")
+    if object_type not in OBJECT_TYPES:
+        raise InputError(
+            f"{path}: field '{name}.object_type' is {object_type!r}; "
+            f"expected one of {', '.join(OBJECT_TYPES)}"
+        )
+    rotation = array(path, document, "rotation", (3, 3), f"{name}.rotation")
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
+        raise InputError(f"{path}: field '{name}.rotation' is not a right-handed rotation matrix")
+    discrete = typed(path, document, "symmetries_discrete", list, f"{name}.symmetries_discrete")
+    continuous = typed(
+        path, document, "symmetries_continuous", list, f"{name}.symmetries_continuous"
+    )
+    try:
+        symmetry = symmetry_from_bop(rotation, discrete, continuous)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: field '{name}.symmetries_*' is wrong: {error}") from None
+    extents = array(path, document, "extents", (3,), f"{name}.extents")
+    if (extents <= 0).any():
+        raise InputError(f"{path}: field '{name}.extents' is not 3 positive lengths")
+    return PoseLabel(
+        origin=array(path, document, "origin", (3,), f"{name}.origin"),
+        rotation=rotation,
+        object_type=object_type,  # pyright: ignore[reportArgumentType]
+        extents=extents,
+        symmetry=symmetry,
+    )
+
+
+def _stable_pose(path: Path, document: Any, index: int) -> StablePose:
+    name = f"stable_poses[{index}]"
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: field {name!r} is not an object")
+    quaternion = unit_quaternion(path, document, f"{name}.quaternion")
+    return StablePose(
+        rotation=quaternion_to_rotation(quaternion),
+        height=number(path, document, "height", f"{name}.height"),
+        probability=number(path, document, "probability", f"{name}.probability"),
+    )
+
+
+def _part_to_json(part: MovingPart) -> dict[str, Any]:
+    joint, cavity = part.joint, part.cavity
+    return {
+        "name": part.name,
+        "joint": {
+            "type": joint.kind,
+            "origin": rounded(joint.origin),
+            "axis": rounded(joint.axis),
+            "range": rounded(joint.range),
+            "frictionloss": float(joint.frictionloss),
+            "damping": float(joint.damping),
+        },
+        "handle": None if part.handle is None else _label_to_json(part.handle),
+        "cavity": None
+        if cavity is None
+        else {
+            "center": rounded(cavity.center),
+            "extents": rounded(cavity.extents),
+            "moves_with_part": cavity.moves_with_part,
+        },
+    }
+
+
+def _part(path: Path, document: Any, index: int) -> MovingPart:
+    name = f"parts[{index}]"
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: field {name!r} is not an object")
+    joint = typed(path, document, "joint", dict, f"{name}.joint")
+    kind = typed(path, joint, "type", str, f"{name}.joint.type")
+    if kind not in ("slide", "hinge"):
+        raise InputError(f"{path}: field '{name}.joint.type' is {kind!r}; expected slide or hinge")
+    low, high = array(path, joint, "range", (2,), f"{name}.joint.range")
+    axis = array(path, joint, "axis", (3,), f"{name}.joint.axis")
+    if low >= high:
+        raise InputError(f"{path}: field '{name}.joint.range' is empty; expected low < high")
+    if abs(np.linalg.norm(axis) - 1) > 1e-3:
+        raise InputError(f"{path}: field '{name}.joint.axis' is not a unit vector")
+    handle, cavity = document.get("handle"), document.get("cavity")
+    for key, value in (("handle", handle), ("cavity", cavity)):
+        if value is not None and not isinstance(value, dict):
+            raise InputError(
+                f"{path}: field '{name}.{key}' is {value!r}; expected an object or null"
+            )
+    return MovingPart(
+        name=typed(path, document, "name", str, f"{name}.name"),
+        joint=Joint(
+            kind=kind,  # pyright: ignore[reportArgumentType]
+            origin=array(path, joint, "origin", (3,), f"{name}.joint.origin"),
+            axis=axis,
+            range=(float(low), float(high)),
+            frictionloss=number(path, joint, "frictionloss", f"{name}.joint.frictionloss"),
+            damping=number(path, joint, "damping", f"{name}.joint.damping"),
+        ),
+        handle=None if handle is None else _label(path, handle, f"{name}.handle"),
+        cavity=None
+        if cavity is None
+        else Cavity(
+            center=array(path, cavity, "center", (3,), f"{name}.cavity.center"),
+            extents=array(path, cavity, "extents", (3,), f"{name}.cavity.extents"),
+            moves_with_part=bool(cavity.get("moves_with_part")),
+        ),
+    )
+
+
+def _read_grasps(path: Path, stable_poses: int) -> GraspSet | None:
+    if not path.is_file():
+        return None
+    document = read_json(path)
+    count = len(typed(path, document, "widths", list))
+    widths = array(path, document, "widths", (count,), "widths")
+    rows = array(path, document, "poses", (count, 12), "poses") if count else np.empty((0, 12))
+    clear = array(path, document, "clear", (count, stable_poses), "clear") if count else None
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, :] = rows.reshape(-1, 3, 4)
+    return GraspSet(
+        poses=poses,
+        widths=widths,
+        clear=np.empty((0, stable_poses), bool) if clear is None else clear.astype(bool),
+    )
