@@ -1,4 +1,4 @@
-"""What every test runs under: one thread a process, and built objects kept out of the user's home."""
+"""What every test runs under: one thread a process, and nothing written into the user's home."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 # Shared by the workers and kept between runs, so that objects are built once.
-os.environ.setdefault(
-    "MANIPOSE_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "manipose-mj")
-)
+_KEPT = Path(__file__).parents[1] / ".pytest_cache"
+os.environ.setdefault("MANIPOSE_CACHE", str(_KEPT / "manipose-mj"))
+os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))

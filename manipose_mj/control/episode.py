@@ -51,6 +51,7 @@ def run_episode(
     started = time.perf_counter()
     environment, baseline = _environment(task, assets, object_name)
     judge = _reset(environment, seed)
+    baseline.status = ""  # the generator below resets it too late for the first record
     recorder = _Recorder(environment, baseline)
     recorder.record()
     failure: StageFailure | None = None

@@ -112,7 +112,7 @@ def _step(entry: Any, where: str, subjects: set[str]) -> Step:
         raise InputError(
             f"{where}: field 'primitive' is {primitive!r}; expected move_to, grasp_at or release"
         )
-    if subject not in subjects:
+    if not isinstance(subject, str) or subject not in subjects:
         raise InputError(
             f"{where}: field 'subject' is {subject!r}; expected one of {', '.join(sorted(subjects))}"
         )
@@ -140,4 +140,5 @@ def _numbers(values: Any, count: int) -> bool:
         isinstance(values, list)
         and len(values) == count
         and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values)
+        and all(abs(v) < 1e6 for v in values)  # Python reads NaN and Infinity from JSON
     )

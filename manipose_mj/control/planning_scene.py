@@ -90,6 +90,8 @@ class PlanningScene:
         """
         self.model = copy.copy(model)
         self.model.geom_margin[:] = DETECTION_DISTANCE
+        # The broad phase drops pairs of bodies by margins of its own.
+        self.model.body_margin[:] = DETECTION_DISTANCE
         self.data = mujoco.MjData(self.model)
         self.robot = subtree_geoms(model, robot_body)
         self.gripper = subtree_geoms(model, gripper_body)

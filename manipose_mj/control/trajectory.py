@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from manipose_mj.mjcf.panda_kinematics import VELOCITY_LIMITS
 
-SERVO_LAG = 0.084  # the arm's servos reach 63 % of a step in this time [s]
+SERVO_LAG = 0.05  # with which the arm follows `timed` targets, fitted to 2 mrad [s]
 
 
 @dataclass(frozen=True)

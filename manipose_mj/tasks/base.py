@@ -57,6 +57,7 @@ class ManipulationTask(composer.Task):
         self.control_timestep = CONTROL_TIMESTEP
         self.success_once = False
         self.max_penetration = 0.0
+        self._geom_masks: dict[composer.Entity, np.ndarray] = {}
 
     def _finish_build(self, pose_observables: dict[str, observable.Observable]) -> None:
         """Add the observables; call once the scene is complete."""
@@ -119,13 +120,15 @@ class ManipulationTask(composer.Task):
         maximum = np.append(POSITION_LIMITS[:, 1], MAX_OPENING)
         return specs.BoundedArray((8,), np.float64, minimum, maximum, name="pd_joint_pos")
 
+    def initialize_episode_mjcf(self, random_state: np.random.RandomState) -> None:
+        self._geom_masks.clear()
+
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
         self._sensors.forget()
         self.robot.set_configuration(physics, HOME, MAX_OPENING)
         self.place_objects(physics, random_state)
-        self._robot_geoms = _membership(physics, self.robot)
         self.success_once = False
         # dm_control's step begins with the second half of the last one.
         physics.forward()
@@ -163,17 +166,17 @@ class ManipulationTask(composer.Task):
     def get_reward(self, physics: mjcf.Physics) -> float:
         return float(self.success_now)
 
+    def _geoms_of(self, physics: mjcf.Physics, entity: composer.Entity) -> np.ndarray:
+        """A mask over geom ids, `(ngeom,)`, looked up once per compiled model."""
+        if entity not in self._geom_masks:
+            mask = np.zeros(physics.model.ngeom, bool)
+            mask[physics.bind(entity.mjcf_model.find_all("geom")).element_id] = True
+            self._geom_masks[entity] = mask
+        return self._geom_masks[entity]
+
     def touches_robot(self, physics: mjcf.Physics, entity: composer.Entity) -> bool:
         """Whether any geom of the robot touches any geom of the entity."""
         contact = physics.data.contact
-        own = _membership(physics, entity)
+        own, robot = self._geoms_of(physics, entity), self._geoms_of(physics, self.robot)
         first, second = contact.geom1, contact.geom2
-        robot = self._robot_geoms
         return bool(np.any((robot[first] & own[second]) | (own[first] & robot[second])))
-
-
-def _membership(physics: mjcf.Physics, entity: composer.Entity) -> np.ndarray:
-    """A mask over geom ids, `(ngeom,)`."""
-    mask = np.zeros(physics.model.ngeom, bool)
-    mask[physics.bind(entity.mjcf_model.find_all("geom")).element_id] = True
-    return mask
