@@ -255,7 +255,9 @@ with mujoco.Renderer(model, 120, 160) as renderer:
 
 def test_agrees_with_gl():
     """In a child process: GL is bound once per process and may crash."""
-    environment = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL",)}
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")
+    }
     works = [b for b in ("osmesa", "egl") if gl.probe(b).works]
     if not works:
         pytest.skip("; ".join(f"{s.backend}: {s.reason}" for s in gl.probe_all()))
