@@ -51,10 +51,9 @@ def _tool(category: str, grams: float | None = None, **more) -> YcbObject:
     return YcbObject(category, "functional", grams, **more)
 
 
-# Masses: the object table of Calli et al., "The YCB Object and Model Set: Towards Common Benchmarks
-# for Manipulation Research", ICAR 2015. None: the table gives only the set's total, or copies of it
-# disagree. The fruits are hollow plastic. `functional` is read off the scans; where it is missing,
-# the labeller takes the thinner end, which is wrong for spoons and hammers.
+# Masses are those commonly quoted from the object table of Calli et al., "The YCB Object and Model
+# Set" (2015); they were not compared with the paper's own table, and copies of it disagree on some
+# (mustard bottle, bleach cleanser, spoon, cups). None: unknown, estimated from the volume.
 OBJECTS: dict[str, YcbObject] = {
     "001_chips_can": _axial("chips_can", 205),
     "002_master_chef_can": _axial("can", 414),

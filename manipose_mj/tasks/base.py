@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -47,6 +48,7 @@ class ManipulationTask(composer.Task):
     Subclasses fill `self._instances` (what segmentation tells apart) before `_finish_build`.
     """
 
+    @abc.abstractmethod
     def __init__(self, config: TaskConfig) -> None:
         self.config = config
         self._arena = TableArena()
@@ -68,23 +70,23 @@ class ManipulationTask(composer.Task):
 
     # What a subclass says about its goal.
 
+    @abc.abstractmethod
     def succeeded(self, physics: mjcf.Physics) -> bool:
         """Whether the goal is met now."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def goal_error(self, physics: mjcf.Physics) -> tuple[float, float] | None:
         """Translation [m] and rotation [rad] error to the goal pose; None without a goal pose."""
-        raise NotImplementedError
 
     @property
+    @abc.abstractmethod
     def goal(self) -> Goal:
         """What this episode wants, for a planner."""
-        raise NotImplementedError
 
     @property
+    @abc.abstractmethod
     def movable(self) -> dict[str, RigidObject]:
         """The rigid objects in play, by the names that goals use."""
-        raise NotImplementedError
 
     @property
     def furnishings(self) -> tuple[ArticulatedObject, ...]:
@@ -92,13 +94,13 @@ class ManipulationTask(composer.Task):
         return ()
 
     @property
+    @abc.abstractmethod
     def object_name(self) -> str:
         """The asset that this episode is about."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Put objects and goal where the episode starts; the robot is home already."""
-        raise NotImplementedError
 
     # composer.Task
 
