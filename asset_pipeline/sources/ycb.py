@@ -53,7 +53,9 @@ def _tool(category: str, grams: float | None = None, **more) -> YcbObject:
 
 # Masses are those commonly quoted from the object table of Calli et al., "The YCB Object and Model
 # Set" (2015); they were not compared with the paper's own table, and copies of it disagree on some
-# (mustard bottle, bleach cleanser, spoon, cups). None: unknown, estimated from the volume.
+# (mustard bottle, bleach cleanser, spoon, cups). None: unknown, estimated from the volume. The fruits
+# are hollow plastic. `functional` is read off the scans; where it is missing, the labeller takes the
+# thinner end, which is wrong for spoons and hammers.
 OBJECTS: dict[str, YcbObject] = {
     "001_chips_can": _axial("chips_can", 205),
     "002_master_chef_can": _axial("can", 414),

@@ -37,8 +37,8 @@ class Clearance:
 
 # Paths through free space; the same once their corners are rounded; the same where the ends leave
 # less room; motions that end in contact.
-TRANSIT = Clearance(arm=0.008, target=0.0, carried=0.005)
-ROUNDED = Clearance(arm=0.003, target=0.0, carried=0.001)
+TRANSIT = Clearance(arm=0.008, target=0.0, carried=0.012)
+ROUNDED = Clearance(arm=0.003, target=0.0, carried=0.006)
 GRAZING = Clearance(arm=0.001, target=0.0, carried=0.0)
 CONTACT = Clearance(arm=0.003, target=-0.003, carried=-0.003)
 
