@@ -10,6 +10,7 @@ from asset_pipeline.assets import GraspSet, MovingPart
 from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
 from manipose_mj.control.planning_scene import PlanningScene, subtree_geoms
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
+from manipose_mj.poses import invert
 from manipose_mj.tasks.base import ManipulationTask
 
 
@@ -83,10 +84,9 @@ class OracleSenses:
         """Bodies of the objects whose label origin lies in a drawer's cavity."""
         if part.cavity is None or not part.cavity.moves_with_part:
             return ()
+        to_cavity = invert(furniture.cavity_pose(self._physics, part.name))
         inside = []
         for thing in objects.values():
-            origin = thing.label_pose[None, :3, 3]
-            place = furniture.in_cavity_frame(self._physics, part.name, origin)[0]
-            if (np.abs(place) < part.cavity.extents / 2).all():
+            if (np.abs((to_cavity @ thing.label_pose)[:3, 3]) < part.cavity.extents / 2).all():
                 inside.append(thing.body)
         return tuple(inside)

@@ -111,11 +111,6 @@ class PlanningScene:
         self.model.body_quat[:] = model.body_quat
         self.data.qpos[:] = qpos
 
-    @property
-    def joints(self) -> Float[np.ndarray, "7"]:
-        """The arm's configuration when last synchronised or asked about [rad]."""
-        return self.data.qpos[self._arm].copy()
-
     def set_opening(self, opening: float) -> None:
         """The gripper's opening [m] in the queries to come."""
         self.data.qpos[self._fingers] = opening / 2

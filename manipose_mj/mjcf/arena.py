@@ -73,11 +73,6 @@ class TableArena(composer.Arena):
                 rgba=[0.45, 0.36, 0.28, 1],
             )  # fmt: skip
 
-    @property
-    def table_geom(self) -> mjcf.Element:
-        """The table's top."""
-        return self._mjcf_root.find("geom", "table")
-
 
 def look_at(
     position: tuple[float, float, float], target: tuple[float, float, float]

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
-from manipose_mj.poses import invert, pose_to_vector, vector_to_pose
+from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
 
 
 class RigidObject(composer.Entity):
@@ -98,10 +98,12 @@ class ArticulatedObject(composer.Entity):
             raise InputError(f"{self.asset.folder}: part {part!r} has no handle label")
         return self.part_pose(physics, part) @ handle.pose
 
-    def in_cavity_frame(
-        self, physics: mjcf.Physics, part: str, points_world: Float[np.ndarray, "n 3"]
-    ) -> Float[np.ndarray, "n 3"]:
-        """Points in the frame of the part's cavity: centred, axes of the object, [m]."""
+    def cavity_pose(self, physics: mjcf.Physics, part: str) -> Float[np.ndarray, "4 4"]:
+        """`T_world_cavity`: the frame centred in the part's cavity, moving with a drawer.
+
+        Raises:
+          InputError: The part has no cavity.
+        """
         cavity = self.asset.part(part).cavity
         if cavity is None:
             raise InputError(
@@ -110,5 +112,4 @@ class ArticulatedObject(composer.Entity):
         carrier = (
             self.part_pose(physics, part) if cavity.moves_with_part else self.base_pose(physics)
         )
-        inverse = invert(carrier)
-        return points_world @ inverse[:3, :3].T + inverse[:3, 3] - cavity.center
+        return carrier @ compose(np.eye(3), cavity.center)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.poses import compose, invert, rotation_about
+from manipose_mj.poses import invert, rotation_about
 from manipose_mj.tasks.base import ManipulationTask, TaskConfig
 from manipose_mj.tasks.goals import StoreGoal
 from manipose_mj.tasks.success import inside_cavity, stored
@@ -89,15 +89,8 @@ class Store(ManipulationTask):
         return (self.furniture,)
 
     def cavity_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
-        """`T_world_cavity`: the frame centred in the cavity, moving with a drawer."""
-        cavity = self.part.cavity
-        assert cavity is not None
-        carrier = (
-            self.furniture.part_pose(physics, self.part.name)
-            if cavity.moves_with_part
-            else self.furniture.base_pose(physics)
-        )
-        return carrier @ compose(np.eye(3), cavity.center)
+        """`T_world_cavity` of the part that this task stores behind."""
+        return self.furniture.cavity_pose(physics, self.part.name)
 
     def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         config = self.task_config
