@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,11 +11,14 @@ from typing import Literal
 import numpy as np
 import trimesh
 from jaxtyping import Float
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from asset_pipeline.assets import Provenance
 from asset_pipeline.labelling.label import ObjectType
+from asset_pipeline.repair import turn_outwards
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 # A tabletop object: what is larger or smaller is almost surely given in another unit [m].
 MAX_EXTENT = 3.0
@@ -24,10 +28,17 @@ MAX_TEXTURE_PIXELS = 1024
 
 @dataclass(frozen=True)
 class ScanItem:
-    """One object that a source offers: its name and the archive or folder that holds it."""
+    """One object that a source offers.
+
+    Attributes:
+      name: The object's.
+      path: The archive or folder that holds it, alone or with others.
+      member: Its mesh file, relative to `path`, where that does not follow from the name.
+    """
 
     name: str
     path: Path
+    member: str = ""
 
 
 @dataclass(frozen=True)
@@ -60,8 +71,15 @@ class Scan:
     functional: Float[np.ndarray, "3"] | None = None
 
 
-def load_scan_mesh(path: Path) -> trimesh.Trimesh:
-    """Read a mesh file, vertices untouched (no merging, so that seams keep their `uv`).
+def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
+    """Read a mesh file, vertices only scaled (no merging, so that seams keep their `uv`).
+
+    Args:
+      path: The file.
+      unit: Length of its unit [m].
+
+    Returns:
+      The mesh in metres, in the frame of the file.
 
     Raises:
       InputError: The file is missing or unreadable, or its mesh cannot be an object on a table.
@@ -74,16 +92,25 @@ def load_scan_mesh(path: Path) -> trimesh.Trimesh:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
     assert isinstance(mesh, trimesh.Trimesh)
-    check_mesh(mesh, str(path))
+    if unit != 1.0:
+        mesh.apply_scale(unit)
+    check_mesh(mesh, str(path), unit=unit)
+    if turned := turn_outwards(mesh):
+        log.warning("%s: %d of %d faces pointed inwards; turned", path, turned, len(mesh.faces))
     return mesh
 
 
-def check_mesh(mesh: trimesh.Trimesh, where: str) -> None:
+def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
     """Refuse a mesh that cannot be a tabletop object in metres.
+
+    Args:
+      mesh: In metres.
+      where: Opens the message.
+      unit: Length of the unit it was given in [m], which the message doubts if the size is wrong.
 
     Raises:
       InputError: No faces, faces that name missing vertices, NaN or infinite vertices, no size, or
-        extents that betray another unit. `where` opens the message.
+        extents that betray another unit.
     """
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(faces) == 0:
@@ -100,14 +127,17 @@ def check_mesh(mesh: trimesh.Trimesh, where: str) -> None:
     size = " x ".join(f"{e:.3g}" for e in extents)
     if float(mesh.area) <= 0 or extents.max() <= 0:
         raise InputError(f"{where}: mesh has zero size ({size}); expected an object in metres")
+    name = {1.0: "metres", 0.001: "millimetres"}.get(unit, f"units of {unit:g} m")
     if extents.max() > MAX_EXTENT:
+        doubt = "is it in millimetres? " if unit == 1.0 else ""
         raise InputError(
             f"{where}: mesh measures {size} m; a tabletop object is below {MAX_EXTENT:g} m: "
-            "is it in millimetres? expected metres"
+            f"{doubt}expected {name}"
         )
     if extents.max() < MIN_EXTENT:
+        doubt = ": is it in metres?" if unit < 1.0 else ";"
         raise InputError(
-            f"{where}: mesh measures {size} m, which is too small to handle; expected metres"
+            f"{where}: mesh measures {size} m, which is too small to handle{doubt} expected {name}"
         )
 
 
@@ -124,8 +154,9 @@ def write_texture(source: Path, target: Path) -> Path:
             image.save(target, format="PNG")
     except FileNotFoundError:
         raise InputError(f"{source}: no such file; expected the scan's texture") from None
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise InputError(f"{source}: cannot be read as an image ({error})") from None
+    except Exception as error:  # each of Pillow's readers fails in its own way
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(f"{source}: cannot be read as an image ({reason})") from None
     return target
 
 

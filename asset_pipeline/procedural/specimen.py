@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from asset_pipeline.assets import MovingPart
+from asset_pipeline.assets import Area, MovingPart
 from asset_pipeline.geometry import Body
 from asset_pipeline.labelling.label import PoseLabel
 
@@ -24,11 +24,13 @@ class Specimen:
       label: The pose label in the object frame.
       bodies: One for a rigid object; the base and its moving parts for an articulated one.
       parts: What `asset.json` says of the moving parts, in the order of `bodies[1:]`.
+      areas: Where it is held and where it does its work.
     """
 
     label: PoseLabel
     bodies: tuple[Body, ...]
     parts: tuple[MovingPart, ...] = ()
+    areas: tuple[Area, ...] = ()
 
 
 def specimen_rng(category: str, index: int) -> np.random.Generator:

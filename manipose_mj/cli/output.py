@@ -50,13 +50,15 @@ def working_on(what: str) -> Iterator[None]:
 class Progress:
     """How far something countable is, on standard error: a bar on a terminal, now and then a line elsewhere."""
 
-    def __init__(self, unit: str) -> None:
+    def __init__(self, unit: str, *, in_bytes: bool = False) -> None:
         """Show nothing yet.
 
         Args:
-          unit: What is counted, in the plural.
+          unit: What is counted, in the plural; what is fetched, where that is bytes.
+          in_bytes: Count bytes, and show how fast they come.
         """
         self._unit = unit
+        self._in_bytes = in_bytes
         self._console = standard_error()
         self._bar: Any = None
         self._start = time.monotonic()
@@ -69,7 +71,11 @@ class Progress:
             self._bar = progress.Progress(
                 progress.TextColumn(self._unit),
                 progress.BarColumn(),
-                progress.MofNCompleteColumn(),
+                *(
+                    (progress.DownloadColumn(), progress.TransferSpeedColumn())
+                    if self._in_bytes
+                    else (progress.MofNCompleteColumn(),)
+                ),
                 progress.TextColumn("{task.description}"),
                 progress.TimeElapsedColumn(),
                 progress.TextColumn("left"),
@@ -84,14 +90,16 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def update(self, done: int, total: int, note: str) -> None:
-        """Say that `done` of `total` are finished, and what came of them."""
+    def update(self, done: int, total: int | None, note: str) -> None:
+        """Say that `done` of `total` (None: nobody knows) are finished, and what came of them."""
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, description=note)
         elif done and time.monotonic() - self._last > REPORT_EVERY_S:
             self._last = time.monotonic()
             seconds = self._last - self._start
-            text = f"{done}/{total} {self._unit}, {note}, {seconds:.0f} s"
+            of = "?" if total is None else f"{total / 1e6:.1f}" if self._in_bytes else str(total)
+            count = f"{done / 1e6:.1f}/{of} MB of" if self._in_bytes else f"{done}/{of}"
+            text = f"{count} {self._unit}, {note}, {seconds:.0f} s"
             self._console.print(text)
 
 

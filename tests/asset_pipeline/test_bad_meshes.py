@@ -10,7 +10,7 @@ import trimesh
 
 from asset_pipeline.build import build
 from asset_pipeline.scan import check_mesh, load_scan_mesh
-from asset_pipeline.sources.archives import extract_tgz
+from asset_pipeline.sources.archives import extract
 from manipose_mj.errors import InputError
 
 BOX = "".join(
@@ -37,7 +37,7 @@ def _tgz(path: Path, members: list[tarfile.TarInfo], content: bytes = b"x") -> P
 def _refused(archive: Path, folder: Path, match: str) -> None:
     before = set(folder.rglob("*")) | set(folder.parent.iterdir())
     with pytest.raises(InputError, match=match) as caught:
-        extract_tgz(archive, folder / "out")
+        extract(archive, folder / "out")
     assert str(archive) in str(caught.value) and "\n" not in str(caught.value)
     assert set(folder.rglob("*")) | set(folder.parent.iterdir()) == before
 
@@ -75,7 +75,7 @@ def test_missing_mesh_is_named(tmp_path):
 
 def test_good_archive_unpacks_whole(tmp_path):
     archive = _tgz(tmp_path / "a.tgz", [tarfile.TarInfo("x/y.txt"), tarfile.TarInfo("x/z.txt")])
-    written = extract_tgz(archive, tmp_path / "out")
+    written = extract(archive, tmp_path / "out")
     assert [p.relative_to(tmp_path / "out").as_posix() for p in written] == ["x/y.txt", "x/z.txt"]
     assert all(p.read_bytes() == b"x" for p in written)
 

@@ -20,7 +20,7 @@ from asset_pipeline.assets import Cavity, MovingPart
 from asset_pipeline.geometry import Body, Joint, Shape
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.mass import shape_mass_properties
-from asset_pipeline.procedural.bar_handle import BarHandle, bar_handle
+from asset_pipeline.procedural.articulated.bar_handle import BarHandle, bar_handle
 from asset_pipeline.procedural.solids import box, rounded_box
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from manipose_mj.poses import SymmetryGroup
