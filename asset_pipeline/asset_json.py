@@ -12,6 +12,7 @@ from asset_pipeline.assets import (
     GRASPS_FILE,
     MODEL_FILE,
     SCHEMA_VERSION,
+    Area,
     Asset,
     Cavity,
     GraspSet,
@@ -28,6 +29,7 @@ from asset_pipeline.json_fields import (
     rounded,
     typed,
     unit_quaternion,
+    write_columns,
     write_json,
 )
 from asset_pipeline.labelling.label import (
@@ -37,7 +39,12 @@ from asset_pipeline.labelling.label import (
     symmetry_to_bop,
 )
 from manipose_mj.errors import InputError
-from manipose_mj.poses import quaternion_to_rotation, rotation_to_quaternion
+from manipose_mj.poses import (
+    pose_to_vector,
+    quaternion_to_rotation,
+    rotation_to_quaternion,
+    vector_to_pose,
+)
 
 
 def write_asset_json(asset: Asset) -> None:
@@ -64,16 +71,15 @@ def write_asset_json(asset: Asset) -> None:
             for p in asset.stable_poses
         ],
         "parts": [_part_to_json(p) for p in asset.parts],
+        "areas": [
+            {"use": a.use, "center": rounded(a.center), "extents": rounded(a.extents)}
+            for a in asset.areas
+        ],
         "provenance": vars(asset.provenance),
     }
     write_json(asset.folder / ASSET_FILE, document)
     if asset.grasps is not None:
-        grasps = {
-            "poses": rounded(asset.grasps.poses[:, :3, :4].reshape(-1, 12)),
-            "widths": rounded(asset.grasps.widths),
-            "clear": asset.grasps.clear.astype(int).tolist(),
-        }
-        write_json(asset.folder / GRASPS_FILE, grasps)
+        _write_grasps(asset.folder / GRASPS_FILE, asset.grasps)
 
 
 def read_asset(folder: Path | str) -> Asset:
@@ -128,6 +134,9 @@ def read_asset(folder: Path | str) -> Asset:
             generator=typed(path, provenance, "generator", str, "provenance.generator"),
         ),
         parts=parts,
+        areas=tuple(
+            _area(path, entry, i) for i, entry in enumerate(typed(path, document, "areas", list))
+        ),
         grasps=_read_grasps(folder / GRASPS_FILE, len(stable)),
     )
 
@@ -263,18 +272,56 @@ def _part(path: Path, document: Any, index: int) -> MovingPart:
     )
 
 
+def _area(path: Path, document: Any, index: int) -> Area:
+    name = f"areas[{index}]"
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: field {name!r} is not an object")
+    use = typed(path, document, "use", str, f"{name}.use")
+    if use not in ("grip", "functional"):
+        raise InputError(f"{path}: field '{name}.use' is {use!r}; expected grip or functional")
+    return Area(
+        use=use,  # pyright: ignore[reportArgumentType]
+        center=array(path, document, "center", (3,), f"{name}.center"),
+        extents=array(path, document, "extents", (3,), f"{name}.extents"),
+    )
+
+
+def _write_grasps(path: Path, grasps: GraspSet) -> None:
+    """Lengths to 10 micrometres, one grasp a line: half a catalogue's size were digits nobody needs."""
+    vectors = pose_to_vector(grasps.poses) if len(grasps) else np.empty((0, 7))
+    columns = {
+        "poses": [[*np.round(v[:3], 5).tolist(), *np.round(v[3:], 6).tolist()] for v in vectors],
+        "widths": np.round(grasps.widths, 5).tolist(),
+        "clear": grasps.clear.astype(int).tolist(),
+    }
+    counts = {"held": grasps.held, "tried": grasps.tried}
+    write_columns(path, counts, columns)
+
+
 def _read_grasps(path: Path, stable_poses: int) -> GraspSet | None:
     if not path.is_file():
         return None
     document = read_json(path)
     count = len(typed(path, document, "widths", list))
     widths = array(path, document, "widths", (count,), "widths")
-    rows = array(path, document, "poses", (count, 12), "poses") if count else np.empty((0, 12))
+    vectors = array(path, document, "poses", (count, 7), "poses") if count else np.empty((0, 7))
     clear = array(path, document, "clear", (count, stable_poses), "clear") if count else None
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    poses[:, :3, :] = rows.reshape(-1, 3, 4)
+    norms = np.linalg.norm(vectors[:, 3:], axis=1)
+    if (np.abs(norms - 1) > 1e-3).any():
+        raise InputError(f"{path}: field 'poses' is not positions and unit wxyz quaternions")
+    held, tried = document.get("held", 0), document.get("tried")
+    if tried is None:
+        held = 0
+    elif not (type(held) is type(tried) is int and 0 <= held <= min(tried, count)):
+        raise InputError(
+            f"{path}: fields 'held' and 'tried' are {held!r} and {tried!r}; expected whole numbers, "
+            f"held not above tried or the {count} grasps"
+        )
+    vectors[:, 3:] /= norms[:, None]
     return GraspSet(
-        poses=poses,
+        poses=vector_to_pose(vectors) if count else np.empty((0, 4, 4)),
         widths=widths,
         clear=np.empty((0, stable_poses), bool) if clear is None else clear.astype(bool),
+        held=held,
+        tried=tried,
     )

@@ -22,6 +22,7 @@ SCHEMA_VERSION = 1
 ASSET_FILE = "asset.json"
 MODEL_FILE = "model.xml"
 GRASPS_FILE = "grasps.json"
+MIN_HELD = 20  # grasps that survive a lift and a shake, from which on an object counts as graspable
 
 
 @dataclass(frozen=True)
@@ -53,14 +54,23 @@ class GraspSet:
         midway between the finger pads.
       widths: `(n,)` [m], between the pads when they touch.
       clear: `(n, s)`, whether the open gripper stays clear of the plane in stable pose `s`.
+      held: The first so many survived a lift and a shake in simulation.
+      tried: So many were tried; those that failed are left out. None: nobody has tried.
     """
 
     poses: Float[np.ndarray, "n 4 4"]
     widths: Float[np.ndarray, "n"]
     clear: np.ndarray
+    held: int = 0
+    tried: int | None = None
 
     def __len__(self) -> int:
         return len(self.poses)
+
+    @property
+    def graspable(self) -> bool | None:
+        """Whether enough of them held; None where nobody has tried."""
+        return None if self.tried is None else self.held >= MIN_HELD
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,20 @@ class MovingPart:
     joint: Joint
     handle: PoseLabel | None
     cavity: Cavity | None
+
+
+@dataclass(frozen=True)
+class Area:
+    """A part of an object with a purpose: a box along the label's axes.
+
+    Attributes: use, `"grip"` where it is held or `"functional"` where it does its work (a blade, a
+    bristle head, a mug's opening); center `(3,)` [m] in the label frame; extents `(3,)` [m], full
+    lengths along the label's X, Y, Z.
+    """
+
+    use: Literal["grip", "functional"]
+    center: Float[np.ndarray, "3"]
+    extents: Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True)
@@ -111,12 +135,20 @@ class Asset:
     stable_poses: tuple[StablePose, ...]
     provenance: Provenance
     parts: tuple[MovingPart, ...] = ()
+    areas: tuple[Area, ...] = ()
     grasps: GraspSet | None = None
 
     @property
     def model_path(self) -> Path:
         """The MJCF file."""
         return self.folder / MODEL_FILE
+
+    @property
+    def graspable(self) -> bool | None:
+        """Whether enough grasps hold in simulation, or a moving part has a handle."""
+        if self.kind == "articulated":
+            return any(part.handle is not None for part in self.parts)
+        return None if self.grasps is None else self.grasps.graspable
 
     def part(self, name: str) -> MovingPart:
         """The moving part of this name.

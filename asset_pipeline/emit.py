@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import shutil
 import tempfile
 from dataclasses import replace
@@ -16,6 +14,7 @@ import trimesh
 from asset_pipeline.asset_json import read_asset, write_asset_json
 from asset_pipeline.assets import MODEL_FILE, Asset
 from asset_pipeline.geometry import Body, MassProperties, Shape
+from asset_pipeline.staging import put_in_place
 from manipose_mj.poses import pose_to_vector
 
 COLLISION_GROUP = "3"
@@ -46,25 +45,10 @@ def write_asset(asset: Asset, bodies: tuple[Body, ...]) -> Asset:
         ElementTree.ElementTree(root).write(staging / MODEL_FILE, encoding="unicode")
         write_asset_json(replace(asset, folder=staging))
         staging.chmod(0o755)
-        _swap(staging, folder)
+        put_in_place(staging, folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     return read_asset(folder)
-
-
-def _swap(staging: Path, folder: Path) -> None:
-    """Put `staging` where `folder` is; another process may be doing the same with equal content."""
-    while True:
-        try:
-            os.rename(staging, folder)
-            return
-        except OSError:
-            if not folder.is_dir():
-                raise
-            retired = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-            with contextlib.suppress(FileNotFoundError):
-                os.rename(folder, retired / "old")
-            shutil.rmtree(retired, ignore_errors=True)
 
 
 def model_element(name: str, bodies: tuple[Body, ...], folder: Path) -> ElementTree.Element:
@@ -98,6 +82,11 @@ def model_element(name: str, bodies: tuple[Body, ...], folder: Path) -> ElementT
             solreflimit="0.01 1",
         )
         element.insert(0, joint)
+    pairs = [(part.name, other) for part in parts for other in part.excluded]
+    if pairs:
+        contact = ElementTree.SubElement(root, "contact")
+        for one, other in pairs:
+            ElementTree.SubElement(contact, "exclude", body1=one, body2=other)
     return root
 
 
@@ -105,6 +94,8 @@ def _body_element(
     parent: ElementTree.Element, assets: ElementTree.Element, body: Body, folder: Path
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(parent, "body", name=body.name)
+    if body.balanced:
+        element.set("gravcomp", _numbers([body.balanced]))
     element.append(_inertial_element(body.mass_properties))
     for index, shape in enumerate(body.collision):
         geom = _geom_element(element, assets, shape, f"{body.name}_collision_{index:02d}", folder)
@@ -151,7 +142,7 @@ def _geom_element(
         return geom
     assert shape.mesh is not None
     file = f"meshes/{name}.obj"
-    write_obj(shape.mesh, folder / file)
+    write_obj(shape.mesh, folder / file, digits=6 if "_collision_" in name else 5)
     ElementTree.SubElement(assets, "mesh", name=name, file=file, inertia="shell")
     geom.set("mesh", name)
     if shape.texture is not None:
@@ -164,9 +155,10 @@ def _geom_element(
     return geom
 
 
-def write_obj(mesh: trimesh.Trimesh, path: Path) -> None:
-    """A Wavefront OBJ with micrometre coordinates and, where the mesh has them, texture coordinates."""
-    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.asarray(mesh.vertices)]
+def write_obj(mesh: trimesh.Trimesh, path: Path, *, digits: int) -> None:
+    """A Wavefront OBJ with so many decimals [m] and, where the mesh has them, texture coordinates."""
+    vertices = np.round(np.asarray(mesh.vertices), digits) + 0.0  # no negative zeros
+    lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in vertices]
     uv = getattr(mesh.visual, "uv", None)
     if uv is None:
         lines += [f"f {a} {b} {c}" for a, b, c in np.asarray(mesh.faces) + 1]

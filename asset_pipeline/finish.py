@@ -9,11 +9,13 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.assets import Asset, Provenance
+from asset_pipeline.assets import Area, Asset, Provenance
 from asset_pipeline.emit import write_asset
 from asset_pipeline.geometry import Body
+from asset_pipeline.grasp_trial import with_trials
 from asset_pipeline.grasps import sample_grasps
 from asset_pipeline.labelling.label import PoseLabel
+from asset_pipeline.rest_scene import scratch_model
 from asset_pipeline.stable_poses import stable_poses, verified
 
 # Of round collision shapes: their rest heights are then right to 0.02 mm.
@@ -29,6 +31,7 @@ def finish_rigid(
     up: Float[np.ndarray, "3"],
     body: Body,
     provenance: Provenance,
+    areas: tuple[Area, ...] = (),
 ) -> Asset:
     """Compute the rest poses and the grasps of a rigid object and write its asset folder.
 
@@ -40,6 +43,7 @@ def finish_rigid(
       up: `(3,)` unit vector, up in the object frame.
       body: Collision shapes, looks and mass.
       provenance: Where it came from.
+      areas: Where it is held and where it does its work, in the label frame.
 
     Returns:
       The asset as read back from its folder.
@@ -51,8 +55,9 @@ def finish_rigid(
         trimesh.Trimesh, trimesh.util.concatenate([s.surface(SECTIONS) for s in body.collision])
     )
     poses = stable_poses(touching, body.mass_properties.center_of_mass, label=label)
-    poses = verified(poses, body, label=label)
-    grasps = sample_grasps(body, poses)
+    with scratch_model(body) as model_path:
+        poses = verified(poses, model_path, label=label)
+        grasps = with_trials(sample_grasps(body, poses), poses, model_path)
     asset = Asset(
         folder=Path(folder),
         name=name,
@@ -63,6 +68,7 @@ def finish_rigid(
         mass_properties=body.mass_properties,
         stable_poses=poses,
         provenance=provenance,
+        areas=areas,
         grasps=grasps,
     )
     return write_asset(asset, (body,))

@@ -45,7 +45,7 @@ class Shape:
         elif self.kind == "cylinder":
             mesh = trimesh.creation.cylinder(self.size[0], 2 * self.size[1], sections=sections)
         elif self.kind == "capsule":
-            count = (sections, sections)
+            count = (sections // 4, sections)  # of rings and around; the ends hardly ever touch
             mesh = trimesh.creation.capsule(
                 height=2 * self.size[1], radius=self.size[0], count=count
             )
@@ -101,6 +101,8 @@ class Body:
       joint: How it moves against the asset's base; None for the base and for rigid objects.
       friction: MuJoCo's sliding, torsional and rolling friction; without the last, round things never
         come to rest.
+      excluded: Bodies of the asset that it makes no contact with, where what was drawn overlaps.
+      balanced: Share of its weight that springs carry, as they do an oven's door.
     """
 
     name: str
@@ -109,6 +111,8 @@ class Body:
     mass_properties: MassProperties
     joint: Joint | None = None
     friction: tuple[float, float, float] = (0.8, 0.005, 0.0005)
+    excluded: tuple[str, ...] = ()
+    balanced: float = 0.0
 
     def surface(self) -> trimesh.Trimesh:
         """All visual shapes as one mesh in the object frame."""

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from asset_pipeline.assets import StablePose
-from asset_pipeline.grasp_fit import STANDOFF, Candidates
+from asset_pipeline.assets import GraspSet, StablePose
+from asset_pipeline.grasp_fit import Candidates
 from asset_pipeline.gripper import ParallelJaw
+from asset_pipeline.open_hand import STANDOFF
 
 PLANE_CLEARANCE = 0.003  # [m]
 SPREAD = 0.05  # a distance that counts as much as 60 degrees between approaches [m]
@@ -47,7 +48,7 @@ def diverse(
         clear[:, i] & clear[:, j] for i in range(clear.shape[1]) for j in range(i, clear.shape[1])
     ]
     groups = sorted((g for g in groups if g.any()), key=np.count_nonzero)  # the scarcest first
-    choice = _FarthestChoice(candidates)
+    choice = _FarthestChoice(candidates.poses, candidates.quality)
     for number, group in enumerate(groups):
         places = round(CLEAR_SHARE * count) - len(choice.chosen)
         choice.extend(group, max(1, places // (len(groups) - number)), count)
@@ -56,18 +57,30 @@ def diverse(
     return index[np.argsort(-candidates.quality[index], kind="stable")]
 
 
+def spread_out(grasps: GraspSet, count: int) -> Int[np.ndarray, "k"]:
+    """Indices of at most `count` of the grasps: good, clear of some support, and of every side.
+
+    Args:
+      grasps: Best first.
+      count: How many.
+    """
+    rank = np.linspace(1.0, 0.3, len(grasps))
+    choice = _FarthestChoice(grasps.poses, np.where(grasps.clear.any(axis=1), rank, rank / 2))
+    choice.extend(np.ones(len(grasps), bool), count, count)
+    return np.array(choice.chosen, int)
+
+
 class _FarthestChoice:
     """Grows a set of grasps, each time by the best in quality times distance to the chosen."""
 
-    def __init__(self, candidates: Candidates) -> None:
-        poses = candidates.poses
+    def __init__(self, poses: Float[np.ndarray, "n 4 4"], score: Float[np.ndarray, "n"]) -> None:
         closing = poses[:, :3, 1]
         # y y^T is the same for both signs of y.
         line = np.einsum("ni,nj->nij", closing, closing).reshape(-1, 9) / 2
         features = [poses[:, :3, 3] / SPREAD, poses[:, :3, 2], line]
         self._features = np.hstack(features).astype(np.float32)
-        self._score = candidates.quality.astype(np.float32)
-        self._distance = np.ones(len(candidates), np.float32)
+        self._score = score.astype(np.float32)
+        self._distance = np.ones(len(poses), np.float32)
         self.chosen: list[int] = []
 
     def extend(self, allowed: Bool[np.ndarray, "n"], more: int, limit: int) -> None:

@@ -1,4 +1,4 @@
-"""Fit the hand to one antipodal pair: every approach about its line, what the pads touch, what hits."""
+"""Fit the hand to antipodal pairs: what the pads touch, what the fingers meet, how good it is."""
 
 from __future__ import annotations
 
@@ -6,22 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from asset_pipeline.antipodal import FRICTION, MIN_WIDTH
+from asset_pipeline.approaches import DEPTH, PairFrames
 from asset_pipeline.geometry import MassProperties
 from asset_pipeline.gripper import ParallelJaw
+from asset_pipeline.open_hand import finger_cells, finger_reach, fingers_free
+from asset_pipeline.pad_contact import pad_contact, pad_reach
 from asset_pipeline.touch_points import SurfacePoints
 
-APPROACHES = 24
-DEPTHS = (0.0, 0.005)  # of the pair beyond the pads' centre, towards the tips [m]
-STANDOFF = 0.10  # where the straight approach starts [m]
-MARGIN = 0.0015  # kept between the open fingers and the object's points [m]
-COARSE_CELL = 0.010  # for the hand's large boxes fewer points do, with a larger margin [m]
-COARSE_MARGIN = 0.003
-PAD_DEPTH = 0.001  # points this close to the first touched count as touched [m]
-MIN_COVER = 0.25  # least share of a pad that must touch
-FACING = 0.7  # cosine: a touched point looks at its pad
+MIN_COVER = 0.1  # least share of a pad that must touch
 SLANT = 0.05  # of the touched faces, at which quality has fallen to 1/e: 18 degrees
 SKEW = 0.006  # between the middles of what the pads touch, at which it has fallen to 1/e [m]
 JERK = 20.0  # twice gravity, which a carried object may feel [m/s^2]
@@ -34,7 +29,7 @@ class ObjectCloud:
 
     Attributes:
       touch: The surface that fingers touch.
-      obstacles: `(m, 3)` [m], all that the open fingers must not meet.
+      obstacles: `(m, 3)` [m], all that the open fingers must not meet; those of `touch` come first.
       coarse: `(c, 3)` [m], fewer of them and the outermost corners, for the hand's large boxes.
       mass_properties: What hangs in the hand.
     """
@@ -56,6 +51,10 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.widths)
 
+    def take(self, chosen: np.ndarray) -> Candidates:
+        """Those of a mask, or of indices in their order."""
+        return Candidates(self.poses[chosen], self.widths[chosen], self.quality[chosen])
+
     @classmethod
     def joined(cls, parts: Sequence[Candidates]) -> Candidates:
         """All of `parts`, in order; none gives none."""
@@ -66,208 +65,98 @@ class Candidates:
         )
 
 
-@dataclass(frozen=True)
-class _Contact:
-    """Of each approach.
-
-    Attributes:
-      width: Between the first points that the pads touch [m]; 0 where one touches nothing.
-      middle: Of these along the closing direction, from the pair's centre [m].
-      cover: Share of the pad that touches, the lesser of the two.
-      radius: Of what touches, root mean square, the lesser of the two [m].
-      skew: Between the middles of what the two pads touch, across the closing direction [m].
-    """
-
-    width: Float[np.ndarray, "k"]
-    middle: Float[np.ndarray, "k"]
-    cover: Float[np.ndarray, "k"]
-    radius: Float[np.ndarray, "k"]
-    skew: Float[np.ndarray, "k"]
-
-
-def fit_pair(
-    cloud: ObjectCloud, i: int, j: int, gripper: ParallelJaw, up: Float[np.ndarray, "3"]
+def fit_pairs(
+    cloud: ObjectCloud,
+    frames: PairFrames,
+    free: Bool[np.ndarray, "p hands"],
+    gripper: ParallelJaw,
 ) -> Candidates:
-    """The grasps that close on points i and j, for each approach direction and depth that works.
+    """The grasps that close on these pairs.
 
-    Kept are those whose pads both find enough surface and whose open hand, on the straight way in
-    from the standoff, meets no point of the object.
+    Kept are those whose pads both find enough surface and whose open fingers meet no point of the
+    object.
 
     Args:
       cloud: The object.
-      i: A point of `cloud.touch`.
-      j: The one opposite.
+      frames: The pairs.
+      free: Of each hand, whether what is behind its fingers has room.
       gripper: The hand.
-      up: Of the object at rest; one of the approaches comes as straight from above as it can.
     """
-    touch = cloud.touch
-    closing = touch.normals[j] - touch.normals[i]
-    length = float(np.linalg.norm(closing))
-    closing /= length
-    center = (touch.points[i] + touch.points[j]) / 2
-    half = float((touch.points[j] - touch.points[i]) @ closing) / 2
-    axes = np.repeat(_approach_axes(closing, up), len(DEPTHS), axis=0)
-    depth = np.tile(DEPTHS, APPROACHES)
+    obstacles = cloud.obstacles.T.astype(np.float32)
+    normals = cloud.touch.normals.T.astype(np.float32)
+    reach = max(finger_reach(gripper), pad_reach(gripper))
+    longest = 2 * gripper.clearance + max(high[1] for _, high in gripper.finger)
+    fits: list[_PairFit] = []
+    pictures = []
+    for pair in range(len(frames)):
+        local = frames.local(pair, obstacles)
+        near = np.abs(local[1]) < frames.half[pair] + longest
+        near &= (np.abs(local[0]) < reach) & (np.abs(local[2]) < reach)
+        index = np.flatnonzero(near)
+        local = local[:, index]
+        touch = index[: np.searchsorted(index, len(cloud.touch.points))]
+        fit = _fit(
+            cloud, frames, pair, local[:, : len(touch)], normals[:, touch], free[pair], gripper
+        )
+        if fit is not None:
+            fits.append(fit)
+            pictures.append(finger_cells(local, fit.faces, gripper))
+    clear = fingers_free(np.array(pictures), gripper) if fits else []
+    return Candidates.joined(
+        [f.candidates.take(mine[f.hands]) for f, mine in zip(fits, clear, strict=True)]
+    )
 
-    contact = _contact(touch, center, half, axes, depth, gripper)
+
+@dataclass(frozen=True)
+class _PairFit:
+    """The grasps of one pair before the fingers are looked at.
+
+    Attributes:
+      candidates: The grasps.
+      hands: Which of the pair's hands they are.
+      faces: `(n, 2)` [m], where the open pads' faces are along the closing direction.
+    """
+
+    candidates: Candidates
+    hands: Int[np.ndarray, "n"]
+    faces: Float[np.ndarray, "n 2"]
+
+
+def _fit(
+    cloud: ObjectCloud,
+    frames: PairFrames,
+    pair: int,
+    surface: Float[np.ndarray, "3 m"],
+    normals: Float[np.ndarray, "3 m"],
+    free: Bool[np.ndarray, "hands"],
+    gripper: ParallelJaw,
+) -> _PairFit | None:
+    """What the pads of the free hands find on `surface`, given in the pair's frame; None if nothing."""
+    closing = frames.axes[pair, 1]
+    near = np.abs(np.abs(surface[1]) - frames.half[pair]) < gripper.clearance
+    near = np.flatnonzero(near & (np.hypot(surface[0], surface[2]) < pad_reach(gripper)))
+    surface, normals = surface[:, near], normals[:, near]
+    y = closing.astype(np.float32)
+    outward = (y[0] * normals[0] + y[1] * normals[1] + y[2] * normals[2]) * np.sign(surface[1])
+    hands = np.flatnonzero(free)
+    contact = pad_contact(surface, outward, cloud.touch.spacing, hands, gripper)
     good = (contact.cover > MIN_COVER) & (contact.width > MIN_WIDTH)
     good &= contact.width < gripper.max_opening - gripper.min_clearance
-    index = np.flatnonzero(good)
-    origins = (
-        center + contact.middle[index, None] * closing - depth[index, None] * axes[index][:, :, 2]
-    )
-    free = _free(cloud, origins, axes[index], contact.width[index], gripper)
-    index, origins = index[free], origins[free]
-
-    poses = np.tile(np.eye(4), (len(index), 1, 1))
-    poses[:, :3, :3] = axes[index]
-    poses[:, :3, 3] = origins
+    if not good.any():
+        return None
+    hands, width, middle = hands[good], contact.width[good], contact.middle[good]
+    opening = gripper.opening(width)
+    poses = np.tile(np.eye(4), (len(hands), 1, 1))
+    poses[:, :3, :3] = frames.rotations(pair, hands)
+    poses[:, :3, 3] = frames.center[pair] + middle[:, None] * closing
+    poses[:, :3, 3] -= DEPTH[hands, None] * poses[:, :3, 2]
     weight = cloud.mass_properties
-    lever = np.linalg.norm(np.cross(weight.center_of_mass - center, closing))
-    slant = 1 - length / 2  # one minus the cosine between either normal and the closing direction
+    lever = np.linalg.norm(np.cross(weight.center_of_mass - frames.center[pair], closing))
     # Friction of both pads about the closing line, against the weight's torque.
-    capacity = 2 * FRICTION * gripper.grip_force * (contact.radius[index] + TORSION)
+    capacity = 2 * FRICTION * gripper.grip_force * (contact.radius[good] + TORSION)
     load = weight.mass * JERK * lever / capacity
-    tight = (gripper.opening(contact.width[index]) - contact.width[index]) / (2 * gripper.clearance)
-    quality = np.minimum(contact.cover[index], 1.0) * (0.5 + 0.5 * tight)
-    quality *= np.exp(-slant / SLANT - contact.skew[index] / SKEW) / (1 + load**4)
-    return Candidates(poses, contact.width[index], quality)
-
-
-def _approach_axes(
-    closing: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "k 3 3"]:
-    """Rotations of the hand with y along `closing`, evenly turned about it, the first from above."""
-    first = -up if abs(up @ closing) < 0.95 else np.eye(3)[np.argmin(np.abs(closing))]
-    first = first - (first @ closing) * closing
-    first /= np.linalg.norm(first)
-    other = np.cross(closing, first)
-    angles = np.arange(APPROACHES)[:, None] * (2 * np.pi / APPROACHES)
-    z = np.cos(angles) * first + np.sin(angles) * other
-    return np.stack([np.cross(closing, z), np.broadcast_to(closing, z.shape), z], axis=2)
-
-
-def _contact(
-    touch: SurfacePoints,
-    center: Float[np.ndarray, "3"],
-    half: float,
-    axes: Float[np.ndarray, "k 3 3"],
-    depth: Float[np.ndarray, "k"],
-    gripper: ParallelJaw,
-) -> _Contact:
-    """What pads touch that close along the common y of `axes` on a pair `2 half` apart."""
-    reach = np.hypot(gripper.pad_half_width, gripper.pad_half_height + max(DEPTHS))
-    y, radius = _about_line(touch.points, center, axes[0, :, 1])
-    near = (np.abs(np.abs(y) - half) < gripper.clearance) & (radius < reach)
-    offset = touch.points[near] - center
-    x, z = _along(axes[:, :, 0], offset), _along(axes[:, :, 2], offset) + depth[:, None]
-    y = y[near]
-    outward = _along(axes[:1, :, 1], touch.normals[near])[0] * np.sign(y)
-    window = (np.abs(x) < gripper.pad_half_width) & (np.abs(z) < gripper.pad_half_height)
-    high = np.where(window & (y > 0), y, -np.inf).max(axis=1, initial=-np.inf)
-    low = np.where(window & (y < 0), y, np.inf).min(axis=1, initial=np.inf)
-    facing = window & (outward > FACING)
-    upper = _patch(x, z, facing & (y > high[:, None] - PAD_DEPTH))
-    lower = _patch(x, z, facing & (y < low[:, None] + PAD_DEPTH))
-    touched = np.isfinite(high) & np.isfinite(low)
-    width, middle = np.zeros(len(axes)), np.zeros(len(axes))
-    width[touched] = (high - low)[touched]
-    middle[touched] = (high + low)[touched] / 2
-    full = 4 * gripper.pad_half_width * gripper.pad_half_height / touch.spacing**2
-    return _Contact(
-        width=width,
-        middle=middle,
-        cover=np.where(touched, np.minimum(upper[0], lower[0]) / full, 0.0),
-        radius=np.minimum(upper[3], lower[3]),
-        skew=np.hypot(upper[1] - lower[1], upper[2] - lower[2]),
-    )
-
-
-def _patch(x: np.ndarray, z: np.ndarray, touched: Bool[np.ndarray, "k m"]) -> np.ndarray:
-    """`(4, k)`: number, middle and root mean square radius of the touched points."""
-    count = touched.sum(axis=1)
-    share = touched / np.maximum(count, 1)[:, None]
-    middle_x, middle_z = (share * x).sum(axis=1), (share * z).sum(axis=1)
-    square = (share * (x**2 + z**2)).sum(axis=1) - middle_x**2 - middle_z**2
-    return np.stack([count, middle_x, middle_z, np.sqrt(np.maximum(square, 0.0))])
-
-
-def _free(
-    cloud: ObjectCloud,
-    origins: Float[np.ndarray, "k 3"],
-    axes: Float[np.ndarray, "k 3 3"],
-    width: Float[np.ndarray, "k"],
-    gripper: ParallelJaw,
-) -> Bool[np.ndarray, "k"]:
-    """Whether the open hand on its way in meets no point of the object."""
-    if len(width) == 0:
-        return np.zeros(0, bool)
-    boxes = gripper.boxes(gripper.opening(width))
-    fingers, hand = np.split(boxes, [2 * len(gripper.finger)], axis=1)
-    hand[..., 0, 1] -= COARSE_MARGIN
-    hand[..., 1, 1] += COARSE_MARGIN
-    # The way in; the fingers' is that of the hand's body, which is wider, further back.
-    front = hand[..., 1, 2].max()
-    fingers[..., 0, 2] = np.minimum(fingers[..., 0, 2], front)
-    hand[..., 0, 2] -= STANDOFF
-    _, radius = _about_line(cloud.obstacles, origins[0], axes[0, :, 1])
-    reach = np.hypot(*np.abs(fingers[..., [0, 2]]).max(axis=(0, 1, 2))) + max(DEPTHS) + 2 * MARGIN
-    near = cloud.obstacles[radius < reach]
-    free = ~_meets(near, origins, axes, fingers, MARGIN)
-    free[free] = ~_meets(cloud.coarse, origins[free], axes[free], hand[free], COARSE_MARGIN)
-    return free
-
-
-def _along(axes: Float[np.ndarray, "k 3"], vectors: Float[np.ndarray, "n 3"]) -> np.ndarray:
-    """`(k, n)` products, written out: threads of a BLAS cost more than they save on so few."""
-    a, v = axes.astype(np.float32)[:, :, None], vectors.astype(np.float32)
-    return a[:, 0] * v[:, 0] + a[:, 1] * v[:, 1] + a[:, 2] * v[:, 2]
-
-
-def _about_line(
-    points: Float[np.ndarray, "n 3"], center: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]
-) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-    """Where points are along a line and how far from it [m]."""
-    offset = points - center
-    along = _along(axis[None], offset)[0]
-    square = np.einsum("ni,ni->n", offset, offset) - along**2
-    return along, np.sqrt(np.maximum(square, 0.0))
-
-
-def _meets(
-    points: Float[np.ndarray, "m 3"],
-    origins: Float[np.ndarray, "k 3"],
-    axes: Float[np.ndarray, "k 3 3"],
-    boxes: Float[np.ndarray, "k b 2 3"],
-    margin: float,
-) -> Bool[np.ndarray, "k"]:
-    """Whether any point lies in any box grown by the margin; along y the clearance is the margin.
-
-    The hands share one closing direction.
-    """
-    meets = np.zeros(len(axes), bool)
-    if len(axes) == 0:
-        return meets
-    y = _along(axes[:1, :, 1], points)[0]
-    shift = np.einsum("ki,kij->kj", origins, axes)
-    fronts = boxes[:, :, 1, 2].max(axis=0)
-    boxes = boxes + shift[:, None, None]
-    low, high = boxes[:, :, 0, 1].min(axis=0), boxes[:, :, 1, 1].max(axis=0)
-    layer = ((y[:, None] > low) & (y[:, None] < high)).any(axis=1)
-    points, y = points[layer], y[layer]
-    x, z = _along(axes[:, :, 0], points), _along(axes[:, :, 2], points)
-    # The origins lie within `DEPTHS` of each other, so this is the distance from any hand's y axis.
-    radius = np.hypot(x[0] - shift[0, 0], z[0] - shift[0, 2]) + max(DEPTHS) + margin
-    for box, front in zip(boxes.transpose(1, 0, 2, 3), fronts, strict=True):
-        left = np.flatnonzero(~meets)  # of the hands, those that no box before this one stopped
-        if len(left) == 0:
-            break
-        (x0, y0, z0), (x1, y1, z1) = box[left].transpose(1, 2, 0)[..., None]
-        near = np.flatnonzero((y > y0.min()) & (y < y1.max()) & (radius > -front))
-        inside = z[np.ix_(left, near)] < z1 + margin
-        near = near[inside.any(axis=0)]  # most points lie in front of the box
-        grid = np.ix_(left, near)
-        inside = (np.abs(x[grid] - (x0 + x1) / 2) < (x1 - x0) / 2 + margin) & (y[near] > y0)
-        inside &= (y[near] < y1) & (z[grid] > z0 - margin) & (z[grid] < z1 + margin)
-        meets[left] = inside.any(axis=1)
-    return meets
+    tight = (opening - width) / (2 * gripper.clearance)
+    quality = np.minimum(contact.cover[good], 1.0) * (0.5 + 0.5 * tight)
+    quality *= np.exp(-frames.slant[pair] / SLANT - contact.skew[good] / SKEW) / (1 + load**4)
+    faces = np.stack([middle - opening / 2, middle + opening / 2], axis=1)
+    return _PairFit(Candidates(poses, width, quality), hands, faces)

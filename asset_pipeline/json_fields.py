@@ -20,6 +20,15 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
+def write_columns(path: Path, head: dict[str, Any], columns: dict[str, list[Any]]) -> None:
+    """A JSON object of a few values and some long lists, with one entry of a list on a line."""
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+    for key, rows in columns.items():
+        entries = ",\n".join("  " + json.dumps(row, separators=(",", ":")) for row in rows)
+        lines.append(f" {json.dumps(key)}: [\n{entries}\n ]")
+    path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+
+
 def read_json(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))

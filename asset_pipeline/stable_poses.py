@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -14,10 +12,8 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.assets import StablePose
-from asset_pipeline.emit import model_element
-from asset_pipeline.geometry import Body
 from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.rest_scene import TIMESTEP, rest_scene
+from asset_pipeline.rest_scene import rest_scene
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotation
 
@@ -28,7 +24,11 @@ MIN_DEPTH = 1e-9  # of the centre of mass in the hull; on its face nothing is st
 MAX_SPEED = 0.01  # of a body at rest [m/s]
 MAX_SPIN = 0.1  # [rad/s]
 MAX_TILT = np.deg2rad(5.0)
-SETTLE_TIME = 1.5
+SETTLE_TIME = 1.5  # [s]
+# A tenth of the speeds at rest for this long, and not at once: what is about to topple starts slowly.
+STIRRING, STILL_TIME, LEAST_TIME = 0.1, 0.1, 0.3
+TOPPLED = np.deg2rad(30.0)  # from where no body comes back
+_STRIDE = 10  # steps between two looks
 
 
 def stable_poses(
@@ -71,23 +71,26 @@ def stable_poses(
 
 
 def verified(
-    poses: Sequence[StablePose], body: Body, *, label: PoseLabel | None = None
+    poses: Sequence[StablePose], model_path: Path, *, label: PoseLabel | None = None
 ) -> tuple[StablePose, ...]:
-    """Those of `poses` in which the body stands still after 1.5 s of MuJoCo, renormalised.
+    """Those of `poses` in which the body comes to rest within 1.5 s of MuJoCo, renormalised.
 
     A pose fails when the body's up has tilted by more than 5 degrees, symmetries apart, or when it
     still rolls.
 
+    Args:
+      poses: To be tried.
+      model_path: The object's MJCF, with one free joint.
+      label: Its symmetry group says which poses are alike.
+
     Raises:
       InputError: None of them stands.
     """
-    model = _model(body)
+    model = rest_scene(model_path)
     data = mujoco.MjData(model)
     standing = [p for p in poses if _stands(model, data, p, label)]
     if not standing:
-        raise InputError(
-            f"body {body.name!r} topples from every one of its {len(poses)} rest poses"
-        )
+        raise InputError(f"the object topples from every one of its {len(poses)} rest poses")
     total = sum(p.probability for p in standing)
     return tuple(replace(p, probability=p.probability / total) for p in standing)
 
@@ -96,15 +99,22 @@ def tilt(
     a: Float[np.ndarray, "3 3"], b: Float[np.ndarray, "3 3"], label: PoseLabel | None
 ) -> float:
     """Angle [rad] between two rest rotations `R_world_object`, least over symmetries and yaw."""
+    return float(_tilts(a[2], b[2][None], label)[0])
+
+
+def _tilts(
+    up: Float[np.ndarray, "3"], others: Float[np.ndarray, "n 3"], label: PoseLabel | None
+) -> Float[np.ndarray, "n"]:
+    """Angles [rad] between a vertical and others, all in the object frame, least over symmetries."""
     group = SymmetryGroup.identity() if label is None else label.symmetry
     frame = np.eye(3) if label is None else label.rotation
-    up_a, up_b = a[2] @ frame, b[2] @ frame
-    ups = up_a @ group.rotations
+    ups = (up @ frame @ group.rotations)[:, None]
+    others = others @ frame
     if group.axial:  # compare heights along the axis: the turn about it is free
-        along = np.arccos(np.clip(ups[:, 0], -1, 1)) - np.arccos(np.clip(up_b[0], -1, 1))
-        return float(np.abs(along).min())
-    chord = np.linalg.norm(ups - up_b, axis=1) / 2
-    return float(2 * np.arcsin(np.clip(chord, 0, 1)).min())
+        along = np.arccos(np.clip(ups[..., 0], -1, 1)) - np.arccos(np.clip(others[:, 0], -1, 1))
+        return np.abs(along).min(axis=0)
+    chord = np.linalg.norm(ups - others, axis=2) / 2
+    return (2 * np.arcsin(np.clip(chord, 0, 1))).min(axis=0)
 
 
 def _merge(
@@ -112,15 +122,17 @@ def _merge(
     probabilities: Float[np.ndarray, "n"],
     label: PoseLabel | None,
 ) -> list[tuple[np.ndarray, float]]:
-    merged: list[tuple[np.ndarray, float]] = []
-    for transform, probability in zip(transforms, probabilities, strict=True):
-        for index, (kept, total) in enumerate(merged):
-            if tilt(transform[:3, :3], kept[:3, :3], label) < MERGE_ANGLE:
-                merged[index] = (kept, total + float(probability))
-                break
+    first: list[int] = []  # of the poses that are alike, the most probable
+    total: list[float] = []
+    ups = transforms[:, 2, :3]
+    for index, probability in enumerate(probabilities):
+        alike = np.flatnonzero(_tilts(ups[index], ups[first], label) < MERGE_ANGLE)
+        if len(alike):
+            total[alike[0]] += float(probability)
         else:
-            merged.append((transform, float(probability)))
-    return merged
+            first.append(index)
+            total.append(float(probability))
+    return list(zip(transforms[first], total, strict=True))
 
 
 def _stable_pose(
@@ -137,24 +149,22 @@ def _hull(surface: trimesh.Trimesh) -> trimesh.Trimesh:
         raise InputError("surface has no convex hull; expected a solid object") from None
 
 
-def _model(body: Body) -> mujoco.MjModel:
-    """The body above a plane, from the same MJCF that its asset folder holds."""
-    with tempfile.TemporaryDirectory() as folder:
-        root = model_element(body.name, (replace(body, visual=()),), Path(folder))
-        path = Path(folder) / "model.xml"
-        ElementTree.ElementTree(root).write(path, encoding="unicode")
-        return rest_scene(path)
-
-
 def _stands(
     model: mujoco.MjModel, data: mujoco.MjData, pose: StablePose, label: PoseLabel | None
 ) -> bool:
+    """Whether the body ends at rest as it began; it has ended when it has not stirred for 0.1 s."""
     mujoco.mj_resetData(model, data)
     data.qpos[:7] = pose_to_vector(pose.pose)
-    for _ in range(int(SETTLE_TIME / TIMESTEP)):
-        mujoco.mj_step(model, data)
-    still = np.linalg.norm(data.qvel[:3]) < MAX_SPEED and np.linalg.norm(data.qvel[3:6]) < MAX_SPIN
-    return (
-        bool(still)
-        and tilt(quaternion_to_rotation(data.qpos[3:7]), pose.rotation, label) < MAX_TILT
-    )
+    linear, angular, leaned, still_since = np.inf, np.inf, np.inf, 0.0
+    while data.time < SETTLE_TIME:
+        mujoco.mj_step(model, data, _STRIDE)
+        linear = float(np.linalg.norm(data.qvel[:3]))
+        angular = float(np.linalg.norm(data.qvel[3:6]))
+        leaned = tilt(quaternion_to_rotation(data.qpos[3:7]), pose.rotation, label)
+        if leaned > TOPPLED:
+            return False
+        if linear > STIRRING * MAX_SPEED or angular > STIRRING * MAX_SPIN:
+            still_since = data.time
+        elif data.time > LEAST_TIME and data.time - still_since > STILL_TIME:
+            break
+    return bool(linear < MAX_SPEED and angular < MAX_SPIN and leaned < MAX_TILT)

@@ -27,6 +27,14 @@ class SurfacePoints:
     normals: Float[np.ndarray, "n 3"]
     spacing: float
 
+    def thinned(self, count: int, rng: np.random.Generator) -> SurfacePoints:
+        """A random choice of at most `count` of them."""
+        if len(self.points) <= count:
+            return self
+        chosen = np.sort(rng.choice(len(self.points), count, replace=False))
+        spacing = self.spacing * float(np.sqrt(len(self.points) / count))
+        return SurfacePoints(self.points[chosen], self.normals[chosen], spacing)
+
 
 def surface_points(mesh: trimesh.Trimesh, rng: np.random.Generator) -> SurfacePoints:
     """Area-weighted random points, thinned to one for each cell of a grid and side of a wall.

@@ -45,6 +45,8 @@ def _rigid(folder: Path) -> Asset:
         poses=compose(np.stack([TURN, TURN.T]), np.array([[0.0, 0.1, 0.2], [0.3, 0.0, 0.0]])),
         widths=np.array([0.05, 0.07]),
         clear=np.array([[True], [False]]),
+        held=1,
+        tried=3,
     )
     return Asset(
         folder, "block", "rigid", "box", _label(), np.array([0.0, 0.0, 1.0]), MASS,
@@ -97,10 +99,11 @@ def test_a_rigid_asset_reads_back_as_written(tmp_path):
     np.testing.assert_allclose(back.mass_properties.center_of_mass, MASS.center_of_mass)
     np.testing.assert_array_equal(back.mass_properties.inertia, MASS.inertia)
     assert asset.grasps is not None and back.grasps is not None
-    np.testing.assert_allclose(back.grasps.poses, asset.grasps.poses, atol=1e-8)
+    np.testing.assert_allclose(back.grasps.poses, asset.grasps.poses, atol=5e-6)
     np.testing.assert_allclose(back.grasps.widths, asset.grasps.widths)
     np.testing.assert_array_equal(back.grasps.clear, asset.grasps.clear)
     assert back.grasps.clear.dtype == bool
+    assert (back.grasps.held, back.grasps.tried, back.grasps.graspable) == (1, 3, False)
     assert list_assets(tmp_path) == [asset.folder]
 
 
@@ -235,8 +238,23 @@ BAD_GRASPS = [
     ("widths", 0.05, "widths"),
     ("widths", [0.05], "poses"),
     ("poses", [[0.0] * 12], "poses"),
+    ("poses", [[0.0] * 7] * 2, "poses"),
+    ("held", 3, "held"),
+    ("held", "all", "held"),
+    ("tried", 0, "tried"),
+    ("tried", True, "tried"),
     ("clear", [[1, 1], [0, 0]], "clear"),
 ]
+
+
+def test_grasps_that_nobody_tried_are_not_said_to_fail(written, tmp_path):
+    folder = tmp_path / "block"
+    shutil.copytree(written / "block", folder)
+    document = json.loads((folder / GRASPS_FILE).read_text())
+    del document["tried"]
+    (folder / GRASPS_FILE).write_text(json.dumps(document))
+    grasps = read_asset(folder).grasps
+    assert grasps is not None and grasps.graspable is None and (grasps.held, len(grasps)) == (0, 2)
 
 
 @pytest.mark.parametrize(("field", "value", "named"), BAD_GRASPS)
@@ -299,7 +317,7 @@ def test_a_write_that_fails_leaves_the_old_folder_and_nothing_else(tmp_path, mon
     elif fails == "model":
         monkeypatch.setattr(emit, "model_element", full)
     else:
-        monkeypatch.setattr(emit, "_swap", full)
+        monkeypatch.setattr(emit, "put_in_place", full)
     with pytest.raises(OSError, match="No space"):
         _write(replace(asset, category="other"))
     assert {p: p.read_bytes() for p in asset.folder.rglob("*") if p.is_file()} == before
