@@ -1,42 +1,48 @@
-"""A hash of a module's own source and of every module of ours that it imports, directly or not."""
+"""A hash of modules' own source and of every module of ours that they import, directly or not."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent
 _PACKAGES = ("asset_pipeline", "manipose_mj")
 
 
-def source_hash(module: str, *extra: str) -> str:
+def source_hash(modules: Iterable[str], *extra: str) -> str:
     """Twelve hexadecimal digits that change when any of the code does.
 
     Args:
-      module: Full name of a module of this distribution.
+      modules: Full names of modules of this distribution.
       extra: Further strings that results depend on, such as a library's version.
     """
     digest = hashlib.sha256("\n".join(extra).encode())
-    for path in sorted(sources(module)):
+    for path in sorted(sources(modules)):
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def sources(module: str) -> set[Path]:
-    """The files of a module and of all it imports from this distribution."""
+def sources(modules: Iterable[str]) -> set[Path]:
+    """The files of modules and of all they import from this distribution."""
     found: set[Path] = set()
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         path = _file(waiting.pop())
         if path is not None and path not in found:
             found.add(path)
-            waiting += _imported(ast.parse(path.read_bytes()))
+            waiting += _imported(path.read_bytes())
     return found
 
 
-def _imported(tree: ast.Module) -> Iterator[str]:
+@cache
+def _imported(source: bytes) -> tuple[str, ...]:
+    return tuple(_imports(ast.parse(source)))
+
+
+def _imports(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from jaxtyping import Float
+from scipy.interpolate import PchipInterpolator
 
 from asset_pipeline.geometry import MassProperties, Shape
 
@@ -43,6 +44,17 @@ def fillet(
         arc = (np.sin((1 - weights) * turn) * start + np.sin(weights * turn) * end) / np.sin(turn)
         rounded.append(centre + arc)
     return np.concatenate(rounded)
+
+
+def curve_through(points: Float[np.ndarray, "n 2"], count: int) -> Float[np.ndarray, "count 2"]:
+    """A smooth curve through a profile's points that swings past none of them in r or z.
+
+    Args:
+      points: At least two `(r, z)` [m], no two successive ones alike.
+      count: Points of the curve, evenly spread along it.
+    """
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    return PchipInterpolator(length, points)(np.linspace(0, length[-1], count))
 
 
 def lathe(profile: Float[np.ndarray, "n 2"], sections: int = 72) -> trimesh.Trimesh:

@@ -38,6 +38,11 @@ def specimen_rng(category: str, index: int) -> np.random.Generator:
     return np.random.default_rng([zlib.crc32(category.encode()), index])
 
 
+def drawn(rng: np.random.Generator, low: float, high: float) -> float:
+    """A size [m] or share drawn evenly from a range, to the fourth decimal."""
+    return round(float(rng.uniform(low, high)), 4)
+
+
 def in_turn(index: int, choices: tuple[_Choice, ...]) -> _Choice:
     """The colours of instance `index`, so that neighbours differ; instance 0 has its own."""
     return choices[(index - 1) % len(choices)]

@@ -11,8 +11,8 @@ import pytest
 
 from asset_pipeline.assets import MovingPart
 from asset_pipeline.emit import model_element
-from asset_pipeline.procedural.bar_handle import BarHandle
-from asset_pipeline.procedural.cabinet import DRAWERS, design, generate
+from asset_pipeline.procedural.articulated.bar_handle import BarHandle
+from asset_pipeline.procedural.articulated.cabinet import DRAWERS, design, generate
 from manipose_mj.poses import rotation_about, transform
 
 OPENING_FORCE = 15.0  # [N], what a Panda pulls with ease
