@@ -16,7 +16,7 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
-from asset_pipeline.hull_reduction import reduced_hull
+from asset_pipeline.hull_reduction import hull_parts, reduced_hull
 from asset_pipeline.repair import closed, weld
 from manipose_mj.errors import InputError
 
@@ -35,9 +35,11 @@ class ConvexSettings:
       concavity: CoACD's threshold: how deep a hollow a part may bridge [m].
       concavity_share: The same as a share of the longest extent; the larger counts.
       max_parts: Parts are merged, cheapest first, until there are no more than this.
+      shell_parts: The same for thin-walled vessels, which must stay hollow.
+      shell: Filling no more than this share of its hull, an object is one of those.
       max_vertices: Of one part.
       convex_enough: With at least this share of its hull's volume an object is its hull.
-      hull_vertices: Of that single hull.
+      hull_tolerance: How far a corner of that hull may lie outside the parts it is cut into [m].
       simplification: How far the surface may move before CoACD sees it [m]; time falls with the
         number of faces, and a scan's 16,000 say little that 2,000 do not.
       iterations: Of CoACD's tree search for each cut.
@@ -46,9 +48,11 @@ class ConvexSettings:
     concavity: float = 0.003
     concavity_share: float = 0.02
     max_parts: int = 32
+    shell_parts: int = 64
+    shell: float = 0.2
     max_vertices: int = 32
     convex_enough: float = 0.92
-    hull_vertices: int = 64
+    hull_tolerance: float = 0.001
     simplification: float = 0.0007
     iterations: int = 40
 
@@ -60,7 +64,7 @@ def convexify(
 
     A mesh that can be closed goes to CoACD as it is (`preprocess_mode="off"`); CoACD's voxel
     remeshing, which costs minutes and thickens thin walls, is for those that cannot. An object that
-    is nearly its own convex hull becomes one hull. CoACD's own reduction of the parts' vertices
+    is nearly its own convex hull becomes that hull, in a few slabs. CoACD's own reduction of the parts' vertices
     pulls their surfaces in by up to a centimetre; ours (`hull_reduction`) stays near 1 mm.
 
     Args:
@@ -151,14 +155,17 @@ def _decompose(mesh: trimesh.Trimesh, settings: ConvexSettings) -> list[trimesh.
     except Exception:  # qhull's own type, for flat input
         raise InputError("mesh spans no volume; expected a solid object") from None
     if solid is not None and solid.volume >= settings.convex_enough * whole.volume:
-        return [reduced_hull(np.asarray(whole.vertices), settings.hull_vertices)]
+        return hull_parts(
+            np.asarray(whole.vertices), settings.max_vertices, tolerance=settings.hull_tolerance
+        )
+    thin = solid is not None and solid.volume <= settings.shell * whole.volume
     source = closed(mesh, settings.simplification) or weld(mesh)
     coacd.set_log_level("error")
     pieces = coacd.run_coacd(
         coacd.Mesh(np.asarray(source.vertices), np.asarray(source.faces)),
         threshold=max(settings.concavity, settings.concavity_share * float(max(source.extents))),
         real_metric=True,
-        max_convex_hull=settings.max_parts,
+        max_convex_hull=settings.shell_parts if thin else settings.max_parts,
         preprocess_mode="off" if source.is_watertight else "on",
         mcts_iterations=settings.iterations,
         resolution=1000,
@@ -182,7 +189,7 @@ def _key(mesh: trimesh.Trimesh, settings: ConvexSettings) -> str:
     digest.update(np.ascontiguousarray(mesh.vertices, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(mesh.faces, dtype="<i8").tobytes())
     digest.update(repr(sorted(asdict(settings).items())).encode())
-    digest.update(f"coacd {version('coacd')}, reduction 1".encode())
+    digest.update(f"coacd {version('coacd')}, reduction 2".encode())
     return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import manifold3d
 import numpy as np
 import trimesh
 from jaxtyping import Float
@@ -9,6 +10,46 @@ from scipy.spatial import ConvexHull, QhullError
 
 # Closer than this to the reduced hull, a point adds nothing a contact could notice [m].
 CLOSE = 2e-5
+
+
+def hull_parts(
+    points: Float[np.ndarray, "n 3"], max_vertices: int, *, tolerance: float, max_parts: int = 8
+) -> list[trimesh.Trimesh]:
+    """The hull of the points as few convex parts of few vertices, each close to what it stands for.
+
+    A hull whose reduction strays is cut in two across its longest side, and so on: round things
+    need more vertices than one part may have.
+
+    Args:
+      points: Not all in one plane [m].
+      max_vertices: Of one part; at least 8.
+      tolerance: How far outside its part a corner of the full hull may lie [m].
+      max_parts: Where to stop in any case; a power of two.
+
+    Raises:
+      scipy.spatial.QhullError: The points span no volume.
+    """
+    part = reduced_hull(points, max_vertices)
+    corners = np.asarray(points)[ConvexHull(points).vertices]
+    planes = ConvexHull(part.vertices).equations
+    strays = float((corners @ planes[:, :3].T + planes[:, 3]).max())
+    if strays <= tolerance or max_parts < 2:
+        return [part]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    axis = int(np.argmax(high - low))
+    middle = float((low + high)[axis] / 2)
+    whole = manifold3d.Manifold.hull_points(np.ascontiguousarray(corners))
+    halves = whole.split_by_plane(tuple(np.eye(3)[axis]), middle)
+    return [
+        part
+        for half in halves
+        for part in hull_parts(
+            np.asarray(half.to_mesh64().vert_properties)[:, :3],
+            max_vertices,
+            tolerance=tolerance,
+            max_parts=max_parts // 2,
+        )
+    ]
 
 
 def reduced_hull(points: Float[np.ndarray, "n 3"], max_vertices: int) -> trimesh.Trimesh:

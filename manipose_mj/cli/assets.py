@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import assets_build, assets_check, assets_list, assets_show
+from manipose_mj.cli import assets_build, assets_check, assets_fetch, assets_list, assets_show
 
 
 def build_app() -> SubcommandApp:
@@ -12,6 +12,8 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(name="build")(assets_build.build_assets)
     app.command(name="check")(assets_check.check_assets)
+    app.command(name="fetch")(assets_fetch.fetch_assets)
     app.command(name="list")(assets_list.list_objects)
+    app.command(name="stats")(assets_list.show_statistics)
     app.command(name="show")(assets_show.show_asset)
     return app

@@ -1,76 +1,114 @@
-"""`manipose assets list`: what is in a folder of assets, or built in."""
+"""`manipose assets list` and `manipose assets stats`: what is built in, or in a folder of assets."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.process import CORES
-
 if TYPE_CHECKING:
-    from asset_pipeline.assets import Asset
+    from asset_pipeline.inventory import Entry
+
+Directory = Annotated[Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")]
+Text = Annotated[str | None, arg(help_behavior_hint="")]
 
 
 def list_objects(
-    directory: Annotated[
-        Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")
-    ] = None,
+    directory: Directory = None,
     /,
     *,
+    category: Text = None,
+    type: Text = None,
+    split: Text = None,
+    source: Text = None,
+    graspable: Annotated[Literal["yes", "no"] | None, arg(help_behavior_hint="")] = None,
     json: bool = False,
 ) -> None:
-    """List assets with their category, type, mass, stable poses and grasps.
+    """List assets with their category, type, split, source and whether a Panda can grasp them.
 
     Args:
-      directory: Folder of assets; without it the built-in objects, which the first time takes a minute.
+      directory: Folder of assets; without it the built-in objects.
+      category: Only this category.
+      type: Only this labelling rule: axial, mirror, functional, articulated.
+      split: Only train or only test.
+      source: Only from sources whose name contains this.
+      graspable: Only those with, or without, 20 grasps that survive a lift and shake in simulation.
       json: Print JSON, for other programs.
     """
-    from asset_pipeline.asset_json import list_assets, read_asset
+    from asset_pipeline.inventory import as_json
     from manipose_mj.cli import output
-    from manipose_mj.cli.builtin_objects import all_names, load_objects
 
-    if directory is None:
-        assets = load_objects(all_names(), CORES)
-    else:
-        assets = [read_asset(folder) for folder in list_assets(directory)]
-    rows = [summary(asset) for asset in assets]
+    rows = _selected(directory, category, type, split, source, graspable)
     if json:
-        output.write_json(rows)
+        output.write_json([as_json(entry) for entry in rows])
         return
     from rich.table import Table
 
-    table = Table("name", "category", "type", "kg", "stable poses", "grasps", "graspable")
-    for column in table.columns[3:6]:
-        column.justify = "right"
-    for row in rows:
-        table.add_row(
-            row["name"],
-            row["category"],
-            row["type"],
-            f"{row['mass_kg']:.3f}",
-            str(row["stable_poses"]),
-            str(row["grasps"]),
-            "yes" if row["graspable"] else "no",
-        )
-    output.standard_output().print(table)
+    table = Table("name", "category", "type", "split", "source", "graspable")
+    for e in rows:
+        held = {True: "yes", False: "no", None: "not tried"}[e.graspable]
+        table.add_row(e.name, e.category, e.type, e.split or "-", e.source, held)
+    console = output.standard_output()
+    console.print(table)
+    console.print(f"{len(rows)} assets")
 
 
-def summary(asset: Asset) -> dict[str, Any]:
-    """One asset in a line.
+def show_statistics(
+    directory: Directory = None,
+    /,
+    *,
+    category: Text = None,
+    type: Text = None,
+    split: Text = None,
+    source: Text = None,
+    graspable: Annotated[Literal["yes", "no"] | None, arg(help_behavior_hint="")] = None,
+    json: bool = False,
+) -> None:
+    """Count assets by category, with the share that a Panda can grasp; filters as for `list`.
 
-    `graspable`: the hand can close on it while it lies in one of its stable poses, or on a handle.
+    Args:
+      directory: Folder of assets; without it the built-in objects.
+      category: Only this category.
+      type: Only this labelling rule.
+      split: Only train or only test.
+      source: Only from sources whose name contains this.
+      graspable: Only those with, or without, 20 grasps that hold.
+      json: Print JSON, for other programs.
     """
-    grasps = asset.grasps
-    lying = grasps is not None and bool(grasps.clear.any())
-    return {
-        "name": asset.name,
-        "category": asset.category,
-        "type": asset.label.object_type,
-        "mass_kg": asset.mass_properties.mass,
-        "stable_poses": len(asset.stable_poses),
-        "grasps": 0 if grasps is None else len(grasps),
-        "graspable": lying or any(part.handle is not None for part in asset.parts),
-        "folder": str(asset.folder),
-    }
+    from asset_pipeline.inventory import statistics
+    from manipose_mj.cli import output
+
+    counts = statistics(_selected(directory, category, type, split, source, graspable))
+    if json:
+        output.write_json(counts)
+        return
+    from rich.table import Table
+
+    table = Table("category", "type", "instances", "graspable", "share")
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for name, row in counts["categories"].items():
+        share = f"{row['graspable'] / row['instances']:.0%}"
+        table.add_row(name, row["type"], str(row["instances"]), str(row["graspable"]), share)
+    console = output.standard_output()
+    console.print(table)
+    console.print(
+        f"{counts['rigid']} rigid and {counts['articulated']} articulated assets "
+        f"in {len(counts['categories'])} categories"
+    )
+
+
+def _selected(
+    directory: Path | None,
+    category: str | None,
+    type_: str | None,
+    split: str | None,
+    source: str | None,
+    graspable: str | None,
+) -> list[Entry]:
+    from asset_pipeline.inventory import Filter, built_in, in_folder, select
+
+    entries = built_in() if directory is None else in_folder(directory)
+    hold = None if graspable is None else graspable == "yes"
+    return select(entries, Filter(category, type_, split, source, hold))

@@ -22,11 +22,9 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
     import joblib
 
     from asset_pipeline import catalogue
-    from asset_pipeline.assets import ASSET_FILE
     from manipose_mj.cli import output
 
-    folder = catalogue.cache_folder()
-    missing = [name for name in names if not (folder / name / ASSET_FILE).is_file()]
+    missing = [name for name in names if not catalogue.is_built(*catalogue.find(name))]
     if missing:
         with output.Progress("built-in objects") as progress:
             pool = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
@@ -40,7 +38,7 @@ def all_names() -> list[str]:
     """Of every built-in object."""
     from asset_pipeline import catalogue
 
-    return [name for category in catalogue.names() for name in catalogue.instances(category)]
+    return [name for name, _ in catalogue.entries()]
 
 
 def names_in_tasks() -> list[str]:
