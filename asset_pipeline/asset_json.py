@@ -47,8 +47,11 @@ from manipose_mj.poses import (
 )
 
 
-def write_asset_json(asset: Asset) -> None:
-    """Write `asset.json` and, where the asset has grasps, `grasps.json` into `asset.folder`."""
+def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
+    """Write `asset.json` and, where the asset has grasps, `grasps.json` into `asset.folder`.
+
+    Under another name, the same document without the grasps.
+    """
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": asset.name,
@@ -77,19 +80,19 @@ def write_asset_json(asset: Asset) -> None:
         ],
         "provenance": vars(asset.provenance),
     }
-    write_json(asset.folder / ASSET_FILE, document)
-    if asset.grasps is not None:
+    write_json(asset.folder / file, document)
+    if asset.grasps is not None and file == ASSET_FILE:
         _write_grasps(asset.folder / GRASPS_FILE, asset.grasps)
 
 
-def read_asset(folder: Path | str) -> Asset:
-    """Read and validate an asset folder.
+def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
+    """Read and validate an asset folder, or what another file in it says of the asset.
 
     Raises:
       InputError: A file is missing or a field is wrong; the message names both.
     """
     folder = Path(folder)
-    path = folder / ASSET_FILE
+    path = folder / file
     document = read_json(path)
     version = typed(path, document, "schema_version", int)
     if version != SCHEMA_VERSION:

@@ -5,56 +5,53 @@ from __future__ import annotations
 import hashlib
 import logging
 import tempfile
-import time
-import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Literal
 
 import numpy as np
-from joblib import Parallel, delayed
 
+from asset_pipeline.articulated_build import build_articulated
+from asset_pipeline.articulated_scan import ArticulatedScan
 from asset_pipeline.asset_json import read_asset
 from asset_pipeline.assets import Asset
+from asset_pipeline.build_pool import BuildResult, Order, carry_out
 from asset_pipeline.convexify import ConvexSettings, convexify
 from asset_pipeline.finish import finish_rigid
 from asset_pipeline.geometry import Body, MassProperties, Shape
+from asset_pipeline.labelling.override_label import overridden
+from asset_pipeline.labelling.overrides import LABELS_FILE, Override, read_overrides
 from asset_pipeline.labelling.scan_label import scan_label
+from asset_pipeline.limited_call import LimitError, Limits, limited_call
 from asset_pipeline.mass import shell_mass_properties, solid_mass_properties
+from asset_pipeline.relabel import OVERRIDE, relabelled, write_measured
 from asset_pipeline.repair import closed
 from asset_pipeline.scan import Scan, ScanItem, write_texture
-from asset_pipeline.sources import ycb
+from asset_pipeline.sources import (
+    google_scanned_objects,
+    omniobject3d,
+    pace,
+    partnet_mobility,
+    ycb,
+)
 from manipose_mj.errors import InputError, unknown_name
 
 log = logging.getLogger(__name__)
 
 # A source is a module with `items(path)`, `inputs(item)` and the context manager `opened(item)`.
-SOURCES: dict[str, ModuleType] = {"ycb": ycb}
+SOURCES: dict[str, ModuleType] = {
+    "google_scanned_objects": google_scanned_objects,
+    "omniobject3d": omniobject3d,
+    "pace": pace,
+    "partnet_mobility": partnet_mobility,
+    "ycb": ycb,
+}
 # To be raised with every change that alters what is built.
-GENERATOR_VERSION = 2
+GENERATOR_VERSION = 3
 # Of household objects whose mass nobody published: between foam (150) and filled bottles (1000).
 DENSITY = 400.0  # [kg/m^3]
-
-
-@dataclass(frozen=True)
-class BuildResult:
-    """What became of one object.
-
-    Attributes:
-      name: The object.
-      status: `"built"`, `"skipped"` (up to date) or `"failed"`.
-      folder: Its asset folder.
-      seconds: Wall time.
-      reason: One line, when it failed.
-    """
-
-    name: str
-    status: Literal["built", "skipped", "failed"]
-    folder: Path
-    seconds: float
-    reason: str = ""
+DEFAULT_LIMITS = Limits()
 
 
 def build(
@@ -64,12 +61,15 @@ def build(
     *,
     jobs: int = 1,
     only: Sequence[str] = (),
+    limits: Limits = DEFAULT_LIMITS,
+    labels: Path | None = None,
     progress: Callable[[BuildResult, int], None] | None = None,
 ) -> list[BuildResult]:
     """Build every object at `path` into `out/<name>`.
 
     An asset whose inputs and generator are unchanged is left alone; one bad object never stops the
-    rest. The caller sees each result as it comes, so that a terminal can show a bar.
+    rest. Every object is read and built in a process that is killed at a limit. The caller sees each
+    result as it comes, so that a terminal can show a bar; see `build_pool.carry_out` for clusters.
 
     Args:
       source: A key of `SOURCES`.
@@ -77,65 +77,96 @@ def build(
       out: Folder of asset folders; made if it is not there.
       jobs: Worker processes.
       only: Names of the objects to build; empty for all.
+      limits: Of each object.
+      labels: A person's labels, which override what is measured; see `labelling.overrides`. None:
+        `labels.yaml` in `out`, where there is one.
       progress: Called with each result and the number of objects in all.
 
     Returns:
       One result an object, sorted by name.
 
     Raises:
-      InputError: The source or a name in `only` is unknown, `path` holds no object, or `out` cannot
-        be written.
+      InputError: The source or a name in `only` is unknown, `path` holds no object, the labels are
+        wrong, or `out` cannot be written.
     """
     if source not in SOURCES:
         raise unknown_name("source", source, SOURCES)
-    found = {item.name: item for item in SOURCES[source].items(Path(path))}
+    # Objects are built in processes with other working directories.
+    path, out = Path(path).absolute(), Path(out).absolute()
+    found = {item.name: item for item in _items(source, path, limits)}
     for name in only:
         if name not in found:
             raise unknown_name(f"object in {path}", name, found)
-    chosen = [found[name] for name in (sorted(set(only)) or sorted(found))]
-    _require_writable(Path(out))
-    results = []
-    calls = (delayed(build_item)(source, item, Path(out)) for item in chosen)
-    for result in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
-        results.append(result)
-        if progress is not None:
-            progress(result, len(chosen))
-    return sorted(results, key=lambda r: r.name)
+    require_writable(out)
+    overrides = _overrides(labels, out, found)
+    return carry_out(
+        [
+            Order(
+                name=name,
+                folder=out / name,
+                where=str(found[name].path),
+                build=build_item,
+                arguments=(source, found[name], overrides.get(name)),
+                limits=limits,
+            )
+            for name in (sorted(set(only)) or sorted(found))
+        ],
+        jobs=jobs,
+        progress=progress,
+    )
 
 
-def build_item(source: str, item: ScanItem, out: Path) -> BuildResult:
-    """Build one object unless it is up to date; failures come back as a result."""
-    start = time.perf_counter()
-    folder = out / item.name
+def build_item(
+    source: str, item: ScanItem, override: Override | None, folder: Path, target: Path
+) -> bool:
+    """Build one object into `target`, and return True, unless `folder` is up to date.
 
-    def result(status: Literal["built", "skipped", "failed"], reason: str = "") -> BuildResult:
-        return BuildResult(item.name, status, folder, time.perf_counter() - start, reason)
-
+    Raises:
+      InputError: The object, or what a person said of its label, cannot be used.
+    """
     module = SOURCES[source]
-    try:
-        if _up_to_date(folder, module.inputs(item)):
-            return result("skipped")
-        with module.opened(item) as scan:
-            build_scan(scan, folder)
-    except InputError as error:
-        message = str(error)
-        return result("failed", message if str(item.path) in message else f"{item.path}: {message}")
-    except Exception as error:  # whatever a mesh does to a library, the other objects go on
-        log.error("%s:\n%s", item.path, traceback.format_exc())
-        line = (str(error).splitlines() or [""])[0]
-        return result("failed", f"{item.path}: {type(error).__name__}: {line}")
-    return result("built")
+    said = {} if override is None else {OVERRIDE: override.digest}
+    if up_to_date(folder, module.inputs(item) | said, generator()):
+        return False
+    with module.opened(item) as scan:
+        if isinstance(scan, ArticulatedScan):
+            provenance = replace(scan.provenance, generator=generator())
+            asset = build_articulated(replace(scan, provenance=provenance), target)
+            if override is not None:
+                relabelled(asset, override)
+        else:
+            build_scan(scan, target, override)
+    return True
 
 
-def build_scan(scan: Scan, folder: Path) -> Asset:
+def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> Asset:
     """Label, decompose and weigh one scan, and write its asset folder."""
-    label = scan_label(
+    label, _ = scan_label(
         scan.mesh,
         scan.object_type,
         scan.up,
+        category=scan.category,
         functional=scan.functional,
         textured=scan.texture is not None,
     )
+    measured = Asset(
+        folder=folder,
+        name=scan.name,
+        kind="rigid",
+        category=scan.category,
+        label=label,
+        up=np.asarray(scan.up, float),
+        mass_properties=scan_mass_properties(scan),
+        stable_poses=(),
+        provenance=replace(scan.provenance, generator=generator()),
+    )
+    draft = measured
+    if override is not None:
+        draft = overridden(measured, override, scan.mesh, textured=scan.texture is not None)
+        inputs = draft.provenance.inputs | {OVERRIDE: override.digest}
+        draft = replace(draft, provenance=replace(draft.provenance, inputs=inputs))
+    if scan.texture is None and getattr(scan.mesh.visual, "uv", None) is not None:
+        log.warning("%s: its texture is not there; built without", scan.name)
     parts = convexify(scan.mesh)
     with tempfile.TemporaryDirectory(prefix="manipose-texture-") as scratch:
         texture = scan.texture and write_texture(scan.texture, Path(scratch) / "texture.png")
@@ -143,22 +174,28 @@ def build_scan(scan: Scan, folder: Path) -> Asset:
             name=scan.name,
             collision=parts,
             visual=(Shape(kind="mesh", mesh=scan.mesh, texture=texture),),
-            mass_properties=scan_mass_properties(scan),
+            mass_properties=draft.mass_properties,
         )
-        return finish_rigid(
+        asset = finish_rigid(
             folder,
             name=scan.name,
-            category=scan.category,
-            label=label,
-            up=np.asarray(scan.up, float),
+            category=draft.category,
+            label=draft.label,
+            up=draft.up,
             body=body,
-            provenance=replace(scan.provenance, generator=generator()),
+            provenance=draft.provenance,
         )
+    if override is not None:
+        write_measured(folder, measured)
+    return asset
 
 
 def scan_mass_properties(scan: Scan) -> MassProperties:
     """Mass and inertia of a scan: published mass, else volume times 400 kg/m^3."""
-    solid = closed(scan.mesh) or scan.mesh.convex_hull
+    solid = closed(scan.mesh)
+    if solid is None:
+        log.warning("%s: the surface cannot be closed; mass and inertia are its hull's", scan.name)
+        solid = scan.mesh.convex_hull
     mass = scan.mass
     if mass is None:
         mass = DENSITY * float(solid.volume)
@@ -174,18 +211,48 @@ def generator() -> str:
     return f"asset_pipeline.build {GENERATOR_VERSION} {hashlib.sha256(settings).hexdigest()[:12]}"
 
 
-def _up_to_date(folder: Path, inputs: dict[str, str]) -> bool:
+def up_to_date(folder: Path, inputs: dict[str, str], generator: str) -> bool:
+    """Whether an asset folder was built from these inputs by this generator."""
     try:
         provenance = read_asset(folder).provenance
     except InputError:
         return False
-    return provenance.inputs == inputs and provenance.generator == generator()
+    return provenance.inputs == inputs and provenance.generator == generator
 
 
-def _require_writable(out: Path) -> None:
+def require_writable(out: Path) -> None:
+    """Make the folder.
+
+    Raises:
+      InputError: It cannot be written.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=out):
             pass
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror})") from None
+
+
+def _overrides(labels: Path | None, out: Path, found: dict[str, ScanItem]) -> dict[str, Override]:
+    """A person's labels; a line for each that is of no object here."""
+    path = out / LABELS_FILE if labels is None else labels
+    if labels is None and not path.exists():
+        return {}
+    overrides = read_overrides(path)
+    for name in overrides:
+        # A file may serve several sources that are built into one folder.
+        if name not in found and not (out / name).is_dir():
+            log.warning("%s: %s", path, unknown_name("object", name, found))
+    return overrides
+
+
+def _items(source: str, path: Path, limits: Limits) -> list[ScanItem]:
+    """What the source finds, looking into archives under the same limits."""
+    with tempfile.TemporaryDirectory(prefix="manipose-list-") as scratch:
+        outcome = limited_call(SOURCES[source].items, path, limits=limits, scratch=Path(scratch))
+    if isinstance(outcome.error, LimitError):
+        raise InputError(f"{path}: cannot be listed ({outcome.error})")
+    if outcome.error is not None:
+        raise outcome.error
+    return outcome.value

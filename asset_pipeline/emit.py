@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -72,11 +73,11 @@ def model_element(name: str, bodies: tuple[Body, ...], folder: Path) -> ElementT
             "joint",
             name=part.name,
             type=part.joint.kind,
-            pos=_numbers(part.joint.origin),
-            axis=_numbers(part.joint.axis),
-            range=_numbers(part.joint.range),
-            frictionloss=_numbers([part.joint.frictionloss]),
-            damping=_numbers([part.joint.damping]),
+            pos=numbers(part.joint.origin),
+            axis=numbers(part.joint.axis),
+            range=numbers(part.joint.range),
+            frictionloss=numbers([part.joint.frictionloss]),
+            damping=numbers([part.joint.damping]),
             armature="0.001",
             # A stop that gives way under a pull lets a drawer creep out of its cabinet.
             solreflimit="0.01 1",
@@ -95,13 +96,13 @@ def _body_element(
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(parent, "body", name=body.name)
     if body.balanced:
-        element.set("gravcomp", _numbers([body.balanced]))
+        element.set("gravcomp", numbers([body.balanced]))
     element.append(_inertial_element(body.mass_properties))
     for index, shape in enumerate(body.collision):
         geom = _geom_element(element, assets, shape, f"{body.name}_collision_{index:02d}", folder)
         geom.set("group", COLLISION_GROUP)
         geom.set("condim", "6" if body.friction[2] > 0 else "4")
-        geom.set("friction", _numbers(body.friction))
+        geom.set("friction", numbers(body.friction))
         geom.set("solref", SOLREF)
         geom.set("solimp", SOLIMP)
         geom.set("rgba", "0.3 0.6 0.9 0.4")
@@ -112,7 +113,7 @@ def _body_element(
         geom.set("conaffinity", "0")
         geom.set("mass", "0")
         if shape.texture is None:
-            geom.set("rgba", _numbers(shape.rgba))
+            geom.set("rgba", numbers(shape.rgba))
     return element
 
 
@@ -120,9 +121,9 @@ def _inertial_element(properties: MassProperties) -> ElementTree.Element:
     i = properties.inertia
     return ElementTree.Element(
         "inertial",
-        pos=_numbers(properties.center_of_mass),
-        mass=_numbers([properties.mass]),
-        fullinertia=_numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
+        pos=numbers(properties.center_of_mass),
+        mass=numbers([properties.mass]),
+        fullinertia=numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
     )
 
 
@@ -136,9 +137,9 @@ def _geom_element(
     geom = ElementTree.SubElement(parent, "geom", name=name, type=shape.kind)
     if shape.kind != "mesh":
         vector = pose_to_vector(shape.pose)
-        geom.set("size", _numbers(shape.size))
-        geom.set("pos", _numbers(vector[:3]))
-        geom.set("quat", _numbers(vector[3:]))
+        geom.set("size", numbers(shape.size))
+        geom.set("pos", numbers(vector[:3]))
+        geom.set("quat", numbers(vector[3:]))
         return geom
     assert shape.mesh is not None
     file = f"meshes/{name}.obj"
@@ -168,5 +169,6 @@ def write_obj(mesh: trimesh.Trimesh, path: Path, *, digits: int) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def _numbers(values) -> str:
+def numbers(values: Iterable[float]) -> str:
+    """Numbers as an MJCF attribute, to nine digits."""
     return " ".join(f"{float(v):.9g}" for v in values)

@@ -5,6 +5,10 @@ from __future__ import annotations
 import manifold3d
 import numpy as np
 import trimesh
+from jaxtyping import Int
+
+# Of edges that two faces share, from which on a surface has an inside.
+NEARLY_CLOSED = 0.98
 
 
 def closed(mesh: trimesh.Trimesh, tolerance: float = 0.0) -> trimesh.Trimesh | None:
@@ -30,6 +34,46 @@ def closed(mesh: trimesh.Trimesh, tolerance: float = 0.0) -> trimesh.Trimesh | N
     data = solid.to_mesh64()
     result = trimesh.Trimesh(data.vert_properties[:, :3], data.tri_verts, process=False)
     return result if len(result.faces) and result.volume > 0 else None
+
+
+def open_edges(mesh: trimesh.Trimesh) -> int:
+    """How many edges belong to one face only, seams of the texture apart: the rims of holes."""
+    return int((_edge_counts(_stitched(mesh)) == 1).sum())
+
+
+def turn_outwards(mesh: trimesh.Trimesh) -> int:
+    """Turn the faces of a (nearly) closed surface that point inwards, in place.
+
+    Seen from outside, such faces are not drawn, and the volume that they enclose counts as negative.
+
+    Returns:
+      How many faces were turned.
+    """
+    surface = _stitched(mesh)
+    before = np.array(surface.faces)
+    if (_edge_counts(surface) == 2).mean() < NEARLY_CLOSED:
+        return 0
+    if not surface.is_winding_consistent:
+        trimesh.repair.fix_winding(surface)
+    surface.vertices -= (
+        surface.centroid
+    )  # where it is open, the volume is that of cones from the origin
+    if float(surface.volume) < 0:
+        surface.invert()
+    turned = (np.asarray(surface.faces) != before).any(axis=1)
+    mesh.faces[turned] = mesh.faces[turned][:, ::-1]
+    return int(turned.sum())
+
+
+def _stitched(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The same faces in the same order, on vertices of which no two are at the same place."""
+    places, index = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)
+    return trimesh.Trimesh(places, index.reshape(-1)[np.asarray(mesh.faces)], process=False)
+
+
+def _edge_counts(mesh: trimesh.Trimesh) -> Int[np.ndarray, "edges"]:
+    """Of every edge, the number of its faces."""
+    return np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
 
 
 def weld(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -15,7 +15,7 @@ from PIL import Image
 
 from asset_pipeline.assets import Provenance
 from asset_pipeline.labelling.label import ObjectType
-from asset_pipeline.repair import turn_outwards
+from asset_pipeline.repair import open_edges, turn_outwards
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 # A tabletop object: what is larger or smaller is almost surely given in another unit [m].
 MAX_EXTENT = 3.0
 MIN_EXTENT = 0.003
+USUAL_EXTENT = (0.01, 1.0)  # a warning is due beyond
 MAX_TEXTURE_PIXELS = 1024
 
 
@@ -92,11 +93,14 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
     assert isinstance(mesh, trimesh.Trimesh)
-    if unit != 1.0:
-        mesh.apply_scale(unit)
+    mesh.vertices = np.asarray(mesh.vertices) * unit
     check_mesh(mesh, str(path), unit=unit)
     if turned := turn_outwards(mesh):
         log.warning("%s: %d of %d faces pointed inwards; turned", path, turned, len(mesh.faces))
+    if holes := open_edges(mesh):
+        log.warning(
+            "%s: the surface has holes (%d open edges), filled for contacts and mass", path, holes
+        )
     return mesh
 
 
@@ -115,6 +119,11 @@ def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if len(faces) == 0:
         raise InputError(f"{where}: mesh has no faces; expected a triangle surface")
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise InputError(
+            f"{where}: its rows are of {vertices.shape[-1]} coordinates and {faces.shape[-1]} corners; "
+            "expected 3 and 3"
+        )
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{where}: a face names vertex {faces.max()} of {len(vertices)}")
     bad = ~np.isfinite(vertices).all(axis=1)
@@ -125,8 +134,9 @@ def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
         )
     extents = np.ptp(vertices[np.unique(faces)], axis=0)
     size = " x ".join(f"{e:.3g}" for e in extents)
-    if float(mesh.area) <= 0 or extents.max() <= 0:
-        raise InputError(f"{where}: mesh has zero size ({size}); expected an object in metres")
+    flat = f"{where}: mesh has zero size ({size}); expected an object in metres"
+    if extents.max() <= 0:
+        raise InputError(flat)
     name = {1.0: "metres", 0.001: "millimetres"}.get(unit, f"units of {unit:g} m")
     if extents.max() > MAX_EXTENT:
         doubt = "is it in millimetres? " if unit == 1.0 else ""
@@ -139,6 +149,10 @@ def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
         raise InputError(
             f"{where}: mesh measures {size} m, which is too small to handle{doubt} expected {name}"
         )
+    if not float(mesh.area) > 0:
+        raise InputError(flat)
+    if not USUAL_EXTENT[0] <= extents.max() <= USUAL_EXTENT[1]:
+        log.warning("%s: mesh measures %s m, unusual for a tabletop object", where, size)
 
 
 def write_texture(source: Path, target: Path) -> Path:

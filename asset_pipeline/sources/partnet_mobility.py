@@ -108,7 +108,9 @@ def opened(item: ScanItem) -> Iterator[ArticulatedScan]:
             scan = _scan(item, (folder / item.member).parent)
         except InputError as error:
             # The folder of an unpacked archive is gone by the time anyone reads the message.
-            raise InputError(str(error).replace(str(folder), str(item.path))) from None
+            message = str(error).replace(str(folder), str(item.path))
+            named = str(item.path) in message
+            raise InputError(message if named else f"{item.path}: {message}") from None
         yield scan
 
 

@@ -25,6 +25,7 @@ def build_assets(
     only: Annotated[tuple[str, ...], arg(metavar="NAME...")] = (),
     limit_s: float = 300.0,
     dask: Annotated[str | None, arg(metavar="ADDRESS")] = None,
+    labels: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> int:
     """Build assets from scans: labels, convex parts, mass, stable poses, grasps, MJCF.
 
@@ -41,6 +42,8 @@ def build_assets(
       limit_s: Seconds after which the reading and building of a scan is stopped.
       dask: Build on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786; its workers have
         to see PATH and DIR.
+      labels: A person's labels (YAML), which override what is measured; without it labels.yaml in
+        DIR, where there is one.
     """
     one_thread_per_process()
     from asset_pipeline.build import SOURCES, BuildResult, build
@@ -59,6 +62,8 @@ def build_assets(
         if source == CATALOGUE:
             if path is not None:
                 raise InputError(f"the catalogue is built in and reads no files; leave out {path}")
+            if labels is not None:
+                raise InputError(f"the catalogue's labels are exact by construction; leave out {labels}")
             results = build_catalogue(out, jobs=jobs, only=only, progress=show)
         else:
             if source not in SOURCES:
@@ -68,7 +73,9 @@ def build_assets(
             if not limit_s > 0:
                 raise InputError(f"--limit-s is {limit_s:g}; expected seconds, more than 0")
             limits = Limits(seconds=limit_s)
-            results = build(source, path, out, jobs=jobs, only=only, limits=limits, progress=show)
+            results = build(
+                source, path, out, jobs=jobs, only=only, limits=limits, labels=labels, progress=show
+            )
     failed = [r for r in results if r.status == "failed"]
     for result in failed:
         output.fail_line(f"{result.name}: {result.reason}")

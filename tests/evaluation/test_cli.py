@@ -25,6 +25,7 @@ COMMANDS = (
     "assets",
     "assets build",
     "assets check",
+    "assets fetch",
     "assets list",
     "assets show",
 )

@@ -1,147 +1,69 @@
-"""A table-top cabinet: a column of three drawers and, beside it, a column behind a door.
+"""Cabinets: chests of drawers, cupboards and what combines them, that stand on a table or on the floor.
 
 Real sizes. Sold desk-top drawer cabinets are 250-400 mm deep and 300-450 mm tall, of boards of
-12-18 mm; bar handles stand 30-40 mm off the front. The drawers run on full-extension slides, so that
-a drawer comes out by nearly its own depth; they shut by the slides' friction.
+12-18 mm; drawer units for desks 280-360 mm wide and 690-700 mm tall (IKEA's HELMER is 28 x 43 x 69 cm,
+ALEX 36 x 58 x 70), night stands 370-460 mm wide and 450-700 mm tall (KULLEN 35 x 40 x 49, TARVA
+48 x 39 x 62), kitchen wall cupboards 300-600 mm wide and 370-390 mm deep (METOD), cupboards with two
+doors 800 x 300 x 830 mm (IVAR); none here is taller or wider than 0.90 m, what an arm of 0.85 m can
+serve. Bar handles stand 30-40 mm off the front. The drawers run on full-extension slides, so that a drawer
+comes out by nearly its own depth; they shut by the slides' friction.
 
-Frame: z up, origin at the centre of the carcass's bottom face, front towards -x, door on the +y side.
+Index 0 is a column of three drawers and, beside it, a column behind a door on the +y side.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import radians
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-import trimesh
-from jaxtyping import Float
 
-from asset_pipeline.assets import Cavity, MovingPart
-from asset_pipeline.geometry import Body, Joint, Shape
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import shape_mass_properties
-from asset_pipeline.procedural.articulated.bar_handle import BarHandle, bar_handle
-from asset_pipeline.procedural.solids import box, rounded_box
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
-from manipose_mj.poses import SymmetryGroup
+from asset_pipeline.procedural.articulated.bar_handle import BarHandle
+from asset_pipeline.procedural.articulated.bow_handle import BowHandle
+from asset_pipeline.procedural.articulated.edge_pull import EdgePull
+from asset_pipeline.procedural.articulated.furniture import Cabinet, furniture
+from asset_pipeline.procedural.articulated.knob import Knob
+from asset_pipeline.procedural.articulated.layout import Cell, Layout
+from asset_pipeline.procedural.articulated.mounted import Handle
+from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
 
-WOOD = 680.0  # [kg/m^3], between particle board and beech
-ALUMINIUM = 2700.0
 DRAWERS = ("bottom_drawer", "middle_drawer", "top_drawer")
+CHESTS = {
+    2: ("bottom_drawer", "top_drawer"),
+    3: DRAWERS,
+    4: ("bottom_drawer", "lower_drawer", "upper_drawer", "top_drawer"),
+    5: ("bottom_drawer", "lower_drawer", "middle_drawer", "upper_drawer", "top_drawer"),
+}
+BEHIND = 0.060  # of the carcass's depth, what a drawer's inside lacks [m]
+STAYS_IN = 0.020  # of a drawer's inside, when it is open [m]
 
-
-@dataclass(frozen=True)
-class Cabinet:
-    """Sizes [m], colours, and how the joints resist.
-
-    Attributes:
-      depth, height: Of the carcass.
-      drawer_column, door_column: Widths; the first counts both boards beside the drawers, the second
-        the outer board of the door's side.
-      board, front: Thickness of the carcass's boards and of the drawers' fronts and the door.
-      gap: Between all that moves and all else.
-      wall, wall_height: Of a drawer's sides and back; its floor is as thick.
-      inner_depth: Of a drawer.
-      travel: Of a drawer [m]; swing: of the door [rad].
-      drawer_friction [N], drawer_damping [N s/m], door_friction [N m], door_damping [N m s/rad].
-      handle: On every front; wood, front_rgba, inside: colours.
-    """
-
-    depth: float = 0.400
-    height: float = 0.420
-    drawer_column: float = 0.380
-    door_column: float = 0.260
-    board: float = 0.012
-    front: float = 0.012
-    gap: float = 0.003
-    wall: float = 0.007
-    wall_height: float = 0.055
-    inner_depth: float = 0.340
-    travel: float = 0.320
-    swing: float = radians(110)
-    drawer_friction: float = 2.0
-    drawer_damping: float = 8.0
-    door_friction: float = 0.25
-    door_damping: float = 0.3
-    handle: BarHandle = BarHandle()
-    wood: Colour = (0.86, 0.73, 0.55, 1.0)
-    front_rgba: Colour = (0.76, 0.58, 0.39, 1.0)
-    inside: Colour = (0.91, 0.83, 0.69, 1.0)
-
-    @property
-    def width(self) -> float:
-        """Of the carcass."""
-        return self.drawer_column + self.door_column
-
-    @property
-    def split(self) -> float:
-        """Where the board between the columns has its middle, along y."""
-        return -self.width / 2 + self.drawer_column - self.board / 2
-
-    def opening_heights(self, row: int) -> tuple[float, float]:
-        """Lower and upper end of the space between the boards of a drawer's row."""
-        clear = (self.height - 4 * self.board) / 3
-        low = self.board + row * (clear + self.board)
-        return low, low + clear
-
-
-_WOODS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
-    (
-        (0.93, 0.92, 0.90, 1.0),
-        (0.80, 0.84, 0.86, 1.0),
-        (0.95, 0.94, 0.92, 1.0),
-        (0.20, 0.20, 0.21, 1.0),
-    ),
-    (
-        (0.50, 0.34, 0.22, 1.0),
-        (0.58, 0.40, 0.26, 1.0),
-        (0.70, 0.55, 0.39, 1.0),
-        (0.12, 0.11, 0.10, 1.0),
-    ),
-    (
-        (0.85, 0.76, 0.62, 1.0),
-        (0.42, 0.55, 0.48, 1.0),
-        (0.90, 0.84, 0.73, 1.0),
-        (0.17, 0.16, 0.15, 1.0),
-    ),
-    (
-        (0.78, 0.62, 0.43, 1.0),
-        (0.90, 0.88, 0.83, 1.0),
-        (0.86, 0.75, 0.58, 1.0),
-        (0.25, 0.23, 0.22, 1.0),
-    ),
-    (
-        (0.88, 0.78, 0.60, 1.0),
-        (0.30, 0.38, 0.50, 1.0),
-        (0.92, 0.85, 0.72, 1.0),
-        (0.14, 0.14, 0.16, 1.0),
-    ),
+Rng = np.random.Generator
+# Carcass, fronts, inside, handles.
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+    ((0.93, 0.92, 0.90, 1), (0.80, 0.84, 0.86, 1), (0.95, 0.94, 0.92, 1), (0.20, 0.20, 0.21, 1)),
+    ((0.50, 0.34, 0.22, 1), (0.58, 0.40, 0.26, 1), (0.70, 0.55, 0.39, 1), (0.72, 0.58, 0.30, 1)),
+    ((0.85, 0.76, 0.62, 1), (0.42, 0.55, 0.48, 1), (0.90, 0.84, 0.73, 1), (0.17, 0.16, 0.15, 1)),
+    ((0.78, 0.62, 0.43, 1), (0.90, 0.88, 0.83, 1), (0.86, 0.75, 0.58, 1), (0.25, 0.23, 0.22, 1)),
+    ((0.88, 0.78, 0.60, 1), (0.30, 0.38, 0.50, 1), (0.92, 0.85, 0.72, 1), (0.75, 0.76, 0.77, 1)),
+    ((0.95, 0.95, 0.94, 1), (0.97, 0.97, 0.96, 1), (0.93, 0.93, 0.92, 1), (0.66, 0.67, 0.69, 1)),
+    ((0.28, 0.28, 0.30, 1), (0.34, 0.34, 0.36, 1), (0.55, 0.54, 0.53, 1), (0.78, 0.64, 0.36, 1)),
+    ((0.67, 0.47, 0.29, 1), (0.72, 0.52, 0.33, 1), (0.82, 0.68, 0.49, 1), (0.14, 0.13, 0.12, 1)),
+    ((0.72, 0.16, 0.15, 1), (0.78, 0.20, 0.18, 1), (0.86, 0.84, 0.82, 1), (0.80, 0.80, 0.81, 1)),
 )
 
 
 def design(index: int) -> Cabinet:
-    """The sizes of instance `index`; every one takes a lying chips can in each of its drawers."""
+    """The sizes of instance `index`."""
     if index == 0:
-        return Cabinet()
+        return Cabinet(_beside_a_door((0.356, 0.248), (0.124,) * 3))
     rng = specimen_rng("cabinet", index)
-    wood, front, inside, metal = in_turn(index, _WOODS)
-    standard = Cabinet()
+    wood, front, inside, metal = in_turn(index, _COLOURS)
+    plain = _KINDS[index % len(_KINDS)](rng)
     return replace(
-        standard,
-        height=round(float(rng.uniform(0.396, 0.420)), 3),
-        drawer_column=round(float(rng.uniform(0.345, 0.390)), 3),
-        door_column=round(float(rng.uniform(0.230, 0.280)), 3),
-        wall_height=round(float(rng.uniform(0.050, 0.060)), 3),
-        inner_depth=round(float(rng.uniform(0.335, 0.345)), 3),
-        travel=round(float(rng.uniform(0.315, 0.325)), 3),
-        drawer_friction=round(float(rng.uniform(1.5, 3.0)), 2),
-        drawer_damping=round(float(rng.uniform(5.0, 10.0)), 1),
-        handle=BarHandle(
-            length=round(float(rng.uniform(0.120, 0.140)), 3),
-            thickness=round(float(rng.uniform(0.010, 0.012)), 4),
-            standoff=round(float(rng.uniform(0.035, 0.040)), 4),
-            rgba=metal,
-        ),
+        plain,
+        drawer_friction=drawn(rng, 1.5, 3.0),
+        drawer_damping=drawn(rng, 5.0, 10.0),
+        handle=_PULLS[index % len(_PULLS)](rng, metal),
         wood=wood,
         front_rgba=front,
         inside=inside,
@@ -150,128 +72,234 @@ def design(index: int) -> Cabinet:
 
 def generate(index: int = 0) -> Specimen:
     """Instance `index`, everything shut."""
-    cabinet = design(index)
-    drawers = [_drawer(cabinet, row) for row in range(len(DRAWERS))]
-    moving = [*drawers, _door(cabinet)]
-    bodies = (_carcass(cabinet), *(body for body, _ in moving))
-    surface = trimesh.util.concatenate([body.surface() for body in bodies])
-    low, high = surface.bounds
-    # X up, Y out of the front, Z to the drawers' side.
-    rotation = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-    label = PoseLabel(
-        origin=(low + high) / 2,
-        rotation=rotation,
-        object_type="articulated",
-        extents=np.abs(rotation.T @ (high - low)),
-        symmetry=SymmetryGroup.identity(),
+    return furniture(design(index))
+
+
+def _beside_a_door(columns: tuple[float, float], rows: tuple[float, ...]) -> Layout:
+    """Three drawers on the right, a door on the left."""
+    cells = _stack(DRAWERS, (0, 1))
+    return Layout(columns, rows, (*cells, Cell("door", "door", (1, 2), (0, 3), "left")))
+
+
+def _stack(names: tuple[str, ...], columns: tuple[int, int], first: int = 0) -> tuple[Cell, ...]:
+    """Drawers one above the other."""
+    return tuple(
+        Cell(name, "drawer", columns, (first + k, first + k + 1)) for k, name in enumerate(names)
     )
-    return Specimen(label, bodies, tuple(part for _, part in moving))
 
 
-def _carcass(c: Cabinet) -> Body:
-    x, y, t = c.depth / 2, c.width / 2, c.board
-    sides = [
-        ((-x, -y, t), (x, -y + t, c.height - t)),
-        ((-x, c.split - t / 2, t), (x, c.split + t / 2, c.height - t)),
-        ((-x, y - t, t), (x, y, c.height - t)),
-    ]
-    shelves = [
-        (
-            (-x, -y + t, c.opening_heights(row)[1]),
-            (x - t, c.split - t / 2, c.opening_heights(row)[1] + t),
-        )
-        for row in range(2)
-    ]
-    backs = [
-        ((x - t, -y + t, t), (x, c.split - t / 2, c.height - t)),
-        ((x - t, c.split + t / 2, t), (x, y - t, c.height - t)),
-    ]
-    covers = [((-x, -y, 0.0), (x, y, t)), ((-x, -y, c.height - t), (x, y, c.height))]
-    shapes = [box(*ends, c.wood) for ends in (*covers, *sides)]
-    shapes += [box(*ends, c.inside) for ends in (*shelves, *backs)]
-    return Body("base", tuple(shapes), tuple(shapes), shape_mass_properties(shapes, WOOD))
-
-
-def _drawer(c: Cabinet, row: int) -> tuple[Body, MovingPart]:
-    low, high = c.opening_heights(row)
-    face = -c.depth / 2 - c.gap  # the inner side of the front
-    side = -c.width / 2 + c.board + c.gap, c.split - c.board / 2 - c.gap
-    floor, back = low + c.gap + c.wall, face + c.inner_depth
-    top = low + c.gap + c.wall + c.wall_height
-    panel_z = (
-        c.gap if row == 0 else low - c.board / 2 + c.gap / 2,
-        c.height if row == 2 else high + c.board / 2 - c.gap / 2,
+def _classic(rng: Rng) -> Cabinet:
+    """As index 0; every drawer takes a lying chips can."""
+    clear = (drawn(rng, 0.396, 0.420) - 4 * 0.012) / 3
+    columns = drawn(rng, 0.321, 0.366), drawn(rng, 0.218, 0.268)
+    return Cabinet(
+        _beside_a_door(columns, (clear,) * 3),
+        wall_height=drawn(rng, 0.050, 0.060),
+        inner_depth=drawn(rng, 0.335, 0.345),
+        travel=drawn(rng, 0.315, 0.325),
     )
-    panel = (
-        np.array([face - c.front, -c.width / 2, panel_z[0]]),
-        np.array([face, c.split - c.gap / 2, panel_z[1]]),
-    )
-    inner = side[0] + c.wall, side[1] - c.wall
-    boards = [
-        ((face, side[0], low + c.gap), (back + c.wall, side[1], floor)),
-        ((face, side[0], floor), (back + c.wall, inner[0], top)),
-        ((face, inner[1], floor), (back + c.wall, side[1], top)),
-        ((back, inner[0], floor), (back + c.wall, inner[1], top)),
-    ]
-    cavity_low = np.array([face, inner[0], floor])
-    cavity_high = np.array([back, inner[1], high])
-    cavity = Cavity((cavity_low + cavity_high) / 2, cavity_high - cavity_low, moves_with_part=True)
-    joint = Joint(
-        kind="slide",
-        origin=np.array([face, (side[0] + side[1]) / 2, low]),
-        axis=np.array([-1.0, 0.0, 0.0]),
-        range=(0.0, c.travel),
-        frictionloss=c.drawer_friction,
-        damping=c.drawer_damping,
-    )
-    foot = (panel[0] + panel[1]) / 2
-    foot[0] = face - c.front
-    boxes = [box(*ends, c.inside) for ends in boards]
-    return _moving(c, DRAWERS[row], panel, boxes, foot, "level", joint, cavity)
 
 
-def _door(c: Cabinet) -> tuple[Body, MovingPart]:
-    face = -c.depth / 2 - c.gap
-    y, t = c.width / 2, c.board
-    panel = (
-        np.array([face - c.front, c.split + c.gap / 2, c.gap]),
-        np.array([face, y, c.height]),
-    )
-    cavity_low = np.array([-c.depth / 2, c.split + t / 2, t])
-    cavity_high = np.array([c.depth / 2 - t, y - t, c.height - t])
-    cavity = Cavity((cavity_low + cavity_high) / 2, cavity_high - cavity_low, moves_with_part=False)
-    # About the inner outer edge, the door swings clear of the carcass.
-    joint = Joint(
-        kind="hinge",
-        origin=np.array([face, y, c.height / 2]),
-        axis=np.array([0.0, 0.0, -1.0]),
-        range=(0.0, c.swing),
-        frictionloss=c.door_friction,
-        damping=c.door_damping,
-    )
-    foot = np.array([face - c.front, panel[0][1] + 0.032, (panel[0][2] + panel[1][2]) / 2])
-    return _moving(c, "door", panel, [], foot, "upright", joint, cavity)
+def _mirrored(rng: Rng) -> Cabinet:
+    """The door on the right."""
+    rows = (drawn(rng, 0.112, 0.150),) * 3
+    columns = drawn(rng, 0.22, 0.28), drawn(rng, 0.30, 0.38)
+    door = Cell("door", "door", (0, 1), (0, 3), "right", shelves=int(rng.integers(0, 2)))
+    return _sized(rng, Layout(columns, rows, (*_stack(DRAWERS, (1, 2)), door)), 0.38, 0.44)
 
 
-def _moving(
-    c: Cabinet,
-    name: str,
-    panel: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]],
-    boxes: list[Shape],
-    foot: Float[np.ndarray, "3"],
-    direction,
-    joint: Joint,
-    cavity: Cavity,
-) -> tuple[Body, MovingPart]:
-    """A front panel with its handle and whatever boards hang on it."""
-    grip, grip_looks, handle = bar_handle(c.handle, foot, direction)
-    collision = (box(*panel, c.front_rgba), *boxes, *grip)
-    densities = [WOOD] * (1 + len(boxes)) + [ALUMINIUM] * len(grip)
-    body = Body(
-        name=name,
-        collision=collision,
-        visual=(rounded_box(*panel, 0.002, c.front_rgba), *boxes, *grip_looks),
-        mass_properties=shape_mass_properties(collision, densities),
-        joint=joint,
+def _chest(count: int, width: tuple[float, float], clear: tuple[float, float]) -> Callable:
+    """Drawers one above the other, of clear heights in a range; upper ones may be lower."""
+
+    def sized(rng: Rng) -> Cabinet:
+        step = drawn(rng, 0.0, 0.06)
+        height = drawn(rng, *clear)
+        rows = tuple(height * (1 - step * k) for k in range(count))
+        layout = Layout((drawn(rng, *width),), rows, _stack(CHESTS[count], (0, 1)))
+        return _sized(rng, layout, 0.36, 0.48)
+
+    return sized
+
+
+def _two_doors(rng: Rng) -> Cabinet:
+    """A cupboard with two doors over one space."""
+    door = Cell("door", "double door", (0, 1), (0, 1), shelves=int(rng.integers(1, 3)))
+    height = drawn(rng, 0.46, 0.76)
+    layout = Layout((drawn(rng, 0.50, 0.78),), (height,), (door,))
+    return _sized(rng, layout, 0.30, 0.38, doors=("frame", "glass", "slab"))
+
+
+def _wall_cupboard(rng: Rng) -> Cabinet:
+    """One door, its handle low."""
+    side = "left" if rng.random() < 0.5 else "right"
+    shelves = int(rng.integers(1, 3))
+    door = Cell("door", "door", (0, 1), (0, 1), side, shelves=shelves, handle_at=0.25)
+    layout = Layout((drawn(rng, 0.30, 0.46),), (drawn(rng, 0.42, 0.66),), (door,))
+    return _sized(rng, layout, 0.30, 0.38, doors=("glass", "frame", "slab"), feet=False)
+
+
+def _night_stand(rng: Rng) -> Cabinet:
+    """A drawer above a door."""
+    side = "left" if rng.random() < 0.5 else "right"
+    rows = drawn(rng, 0.27, 0.40), drawn(rng, 0.11, 0.15)
+    door = Cell("door", "door", (0, 1), (0, 1), side, handle_at=0.7)
+    layout = Layout((drawn(rng, 0.34, 0.46),), rows, (door, *_stack(("drawer",), (0, 1), 1)))
+    return _sized(rng, layout, 0.36, 0.42, doors=("frame", "slab"))
+
+
+def _drawer_over_two_doors(rng: Rng) -> Cabinet:
+    """A wide drawer above a double door."""
+    rows = drawn(rng, 0.34, 0.52), drawn(rng, 0.12, 0.16)
+    door = Cell("door", "double door", (0, 1), (0, 1), shelves=1, handle_at=0.7)
+    layout = Layout((drawn(rng, 0.48, 0.70),), rows, (door, *_stack(("drawer",), (0, 1), 1)))
+    return _sized(rng, layout, 0.36, 0.44, doors=("frame", "slab", "glass"))
+
+
+def _two_and_two(rng: Rng) -> Cabinet:
+    """Two drawers side by side above two doors."""
+    rows = drawn(rng, 0.30, 0.46), drawn(rng, 0.11, 0.15)
+    clear = drawn(rng, 0.27, 0.37)
+    cells = (
+        Cell("right_door", "door", (0, 1), (0, 1), "right", shelves=1, handle_at=0.65),
+        Cell("left_door", "door", (1, 2), (0, 1), "left", shelves=1, handle_at=0.65),
+        *_stack(("right_drawer",), (0, 1), 1),
+        *_stack(("left_drawer",), (1, 2), 1),
     )
-    return body, MovingPart(name, joint, handle, cavity)
+    return _sized(rng, Layout((clear, clear), rows, cells), 0.36, 0.44, doors=("frame", "slab"))
+
+
+def _sideboard(rng: Rng) -> Cabinet:
+    """Three drawers between two doors."""
+    rows = (drawn(rng, 0.118, 0.170),) * 3
+    side = drawn(rng, 0.21, 0.25)
+    cells = (
+        Cell("right_door", "door", (0, 1), (0, 3), "right", shelves=1),
+        Cell("left_door", "door", (2, 3), (0, 3), "left", shelves=1),
+        *_stack(DRAWERS, (1, 2)),
+    )
+    layout = Layout((side, drawn(rng, 0.28, 0.33), side), rows, cells)
+    return _sized(rng, layout, 0.36, 0.44, doors=("slab", "frame"))
+
+
+def _desk_unit(rng: Rng) -> Cabinet:
+    """A tall door below, with two drawers above."""
+    rows = drawn(rng, 0.26, 0.34), drawn(rng, 0.10, 0.13), drawn(rng, 0.10, 0.13)
+    side = "left" if rng.random() < 0.5 else "right"
+    cells = (
+        Cell("door", "door", (0, 1), (0, 1), side, handle_at=0.75),
+        *_stack(("lower_drawer", "upper_drawer"), (0, 1), 1),
+    )
+    return _sized(rng, Layout((drawn(rng, 0.28, 0.40),), rows, cells), 0.40, 0.48)
+
+
+def _sized(
+    rng: Rng,
+    layout: Layout,
+    least: float,
+    most: float,
+    *,
+    doors: tuple = ("slab",),
+    feet: bool = True,
+) -> Cabinet:
+    """The layout at a depth in a range [m], with drawers as deep as fit, and feet and top at random."""
+    depth = drawn(rng, least, most)
+    inner = depth - BEHIND
+    lowest = min(layout.rows)
+    return Cabinet(
+        layout,
+        depth=depth,
+        board=drawn(rng, 0.012, 0.018),
+        front=drawn(rng, 0.014, 0.019),
+        wall_height=round(min(lowest - 0.040, drawn(rng, 0.4, 0.7) * lowest), 4),
+        inner_depth=inner,
+        travel=inner - STAYS_IN,
+        feet=drawn(rng, 0.03, 0.10) if feet and rng.random() < 0.5 else 0.0,
+        crown=drawn(rng, 0.016, 0.022) if feet and rng.random() < 0.5 else 0.0,
+        style=doors[int(rng.integers(len(doors)))],
+    )
+
+
+# Thirteen kinds and seven pulls, so that the two go through all their combinations.
+_KINDS: tuple[Callable[[Rng], Cabinet], ...] = (
+    _classic,
+    _chest(2, (0.32, 0.44), (0.13, 0.20)),
+    _two_doors,
+    _classic,
+    _mirrored,
+    _chest(4, (0.30, 0.44), (0.11, 0.16)),
+    _night_stand,
+    _wall_cupboard,
+    _chest(3, (0.34, 0.56), (0.12, 0.19)),
+    _drawer_over_two_doors,
+    _chest(5, (0.30, 0.44), (0.105, 0.135)),
+    _two_and_two,
+    _sideboard,
+    _desk_unit,
+)
+
+
+def _bar(rng: Rng, rgba: Colour) -> Handle:
+    return BarHandle(
+        length=drawn(rng, 0.120, 0.140),
+        thickness=drawn(rng, 0.010, 0.012),
+        standoff=drawn(rng, 0.035, 0.040),
+        rgba=rgba,
+    )
+
+
+def _long_bar(rng: Rng, rgba: Colour) -> Handle:
+    return BarHandle(
+        length=drawn(rng, 0.160, 0.220),
+        thickness=drawn(rng, 0.011, 0.013),
+        standoff=drawn(rng, 0.030, 0.036),
+        inset=drawn(rng, 0.025, 0.040),
+        rounding=0.004,
+        rgba=rgba,
+    )
+
+
+def _bow(rng: Rng, rgba: Colour) -> Handle:
+    width = drawn(rng, 0.009, 0.011)
+    return BowHandle(
+        span=float(rng.choice([0.096, 0.128, 0.160])),
+        width=width,
+        thickness=width + drawn(rng, 0.0, 0.002),
+        standoff=drawn(rng, 0.028, 0.036),
+        power=drawn(rng, 2.8, 4.5),
+        rgba=rgba,
+    )
+
+
+def _knob(rng: Rng, rgba: Colour) -> Handle:
+    diameter = drawn(rng, 0.026, 0.031)
+    return Knob(
+        diameter=diameter,
+        stem=drawn(rng, 0.014, 0.018),
+        depth=diameter + drawn(rng, 0.001, 0.003),
+        neck=drawn(rng, 0.36, 0.44),
+        rgba=rgba,
+    )
+
+
+def _edge(rng: Rng, rgba: Colour) -> Handle:
+    height = drawn(rng, 0.010, 0.013)
+    return EdgePull(
+        length=drawn(rng, 0.10, 0.20),
+        height=height,
+        thickness=height + drawn(rng, 0.0, 0.002),
+        standoff=drawn(rng, 0.028, 0.034),
+        rgba=rgba,
+    )
+
+
+_PULLS: tuple[Callable[[Rng, Colour], Handle], ...] = (
+    _long_bar,
+    _bow,
+    _knob,
+    _bar,
+    _edge,
+    _bow,
+    _knob,
+    _long_bar,
+    _edge,
+)

@@ -31,6 +31,7 @@ from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specim
 from asset_pipeline.procedural.turned import turned
 from manipose_mj.poses import SymmetryGroup, compose
 
+LENS_SHARE = 0.5  # of the body's density: tubes with air between the glasses
 BLACK: Colour = (0.10, 0.10, 0.11, 1.0)
 GLASS: Colour = (0.10, 0.13, 0.26, 1.0)
 SILVER: Colour = (0.76, 0.77, 0.78, 1.0)
@@ -86,7 +87,7 @@ def design(index: int) -> Camera:
     if index == 0:
         return Camera()
     rng = specimen_rng("camera", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     # Width, height, depth, edge, lens, reach, steps, grip, hump, dial, density.
     low, high = {
         "compact": (
@@ -102,8 +103,9 @@ def design(index: int) -> Camera:
             (0.138, 0.090, 0.045, 0.007, 0.035, 0.058, 1.00, 0.012, 0.023, 0.010, 750.0),
         ),
     }[style]
-    sizes = (round(float(value), 4) for value in rng.uniform(low, high))
-    return Camera(style, *sizes, *in_turn(index, _LOOKS))
+    sizes = [round(float(value), 4) for value in rng.uniform(low, high)]
+    covering, plates, barrel = in_turn(index, _LOOKS)
+    return Camera(style, *sizes, covering=covering, plates=plates, barrel=barrel)
 
 
 def generate(index: int = 0) -> Specimen:
@@ -178,7 +180,9 @@ def _lens(camera: Camera) -> Piece:
         (length, camera.barrel),
     )
     levels = (-0.002, 0.0024, 0.003, 0.68 * length, 0.76 * length, length - 0.001)
-    piece = turned(np.array(corners), levels, bands=bands, density=camera.density, sections=48)
+    piece = turned(
+        np.array(corners), levels, bands=bands, density=LENS_SHARE * camera.density, sections=48
+    )
     face = compose(np.eye(3), np.array([0.0, 0.0, length]))
     prints = tuple(
         _print(ellipse((share * front, share * front), 32), face, rgba, layer)

@@ -1,8 +1,9 @@
-"""A computer mouse with two buttons and a wheel, with or without the start of its cord.
+"""A computer mouse with two buttons, a wheel and the start of its cord.
 
 Real sizes: mice on sale are 95-125 mm long, 56-68 mm wide and 34-43 mm high and weigh 0.06-0.13 kg (Logitech's and
-Microsoft's data sheets: M185 99 x 60 x 39 mm and 0.075 kg, B100 113 x 62 x 38 mm and 0.09 kg). Up is X. The palm's end
-is high and broad and the buttons' end low, so by the rule of the bulge the buttons are on Y's side.
+Microsoft's data sheets: M185 99 x 60 x 39 mm and 0.075 kg, B100 113 x 62 x 38 mm and 0.09 kg). Of the cord only the
+bend relief is rigid. Up is X. The palm's end is high and broad and the cord reaches out in front, so by the rule of
+the bulge buttons and cord are on Y's side.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import PchipInterpolator
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
@@ -27,6 +29,7 @@ from manipose_mj.poses import SymmetryGroup, compose
 RUBBER: Colour = (0.12, 0.12, 0.13, 1.0)
 GAP: Colour = (0.05, 0.05, 0.06, 1.0)
 POINTS = 48
+BELT = 10  # points of a section between its top and the sides' colour
 WHEEL_WIDTH = 0.007
 WHEEL_RISE = 0.0032  # of the wheel above the shell [m]
 
@@ -52,7 +55,7 @@ class Mouse:
     round_off: float = 0.30
     square: float = 2.7
     split: float = 0.48
-    cord: float = 0.0
+    cord: float = 0.017
     density: float = 640.0
     shell: Colour = (0.17, 0.17, 0.19, 1.0)
     buttons: Colour = (0.24, 0.25, 0.27, 1.0)
@@ -81,11 +84,10 @@ _LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
 
 
 def design(index: int) -> Mouse:
-    """The sizes of instance `index`; 0 is dark and cordless, every second one after it has a cord."""
+    """The sizes of instance `index`; 0 is dark."""
     if index == 0:
         return Mouse()
     rng = specimen_rng("computer_mouse", index)
-    corded = index % 2 == 1
     length = drawn(rng, 0.096, 0.112)
     return Mouse(
         length,
@@ -98,7 +100,7 @@ def design(index: int) -> Mouse:
         round_off=drawn(rng, 0.24, 0.34),
         square=drawn(rng, 2.4, 3.2),
         split=drawn(rng, 0.42, 0.54),
-        cord=drawn(rng, 0.012, 0.017) if corded else 0.0,
+        cord=drawn(rng, 0.015, 0.020),
         density=round(float(rng.uniform(520.0, 760.0)), 0),
         **dict(zip(("shell", "buttons", "sides", "wheel"), in_turn(index, _LOOKS), strict=True)),
     )
@@ -108,9 +110,7 @@ def generate(index: int = 0) -> Specimen:
     """Instance `index`: buttons along +x, standing on z = 0."""
     mouse = design(index)
     x, y = mouse.length / 2, mouse.width / 2
-    pieces = [_shell(mouse), _wheel(mouse)]
-    if mouse.cord:
-        pieces.append(_cord(mouse))
+    pieces = [_shell(mouse), _wheel(mouse), _cord(mouse)]
     return rigid_specimen(
         "computer_mouse",
         pieces,
@@ -122,8 +122,6 @@ def generate(index: int = 0) -> Specimen:
 
 def _profile(mouse: Mouse, share: Float[np.ndarray, "n"]) -> tuple[np.ndarray, np.ndarray]:
     """Heights and half widths at shares of the length from the rear, end roundings included."""
-    from scipy.interpolate import PchipInterpolator
-
     top = PchipInterpolator(
         [0, mouse.peak, 0.72, 1], [0.80, 1.0, 0.5 + mouse.front / 2, mouse.front]
     )
@@ -161,11 +159,9 @@ def _loops(mouse: Mouse) -> Float[np.ndarray, "stations points 3"]:
 def _shell(mouse: Mouse) -> Piece:
     loops = _loops(mouse)
     mesh = loft_outwards(loops)
-    centre = mesh.triangles_center
-    split = mouse.length * (0.5 - mouse.split)
-    belt = 0.36 * mouse.height * mouse.front / 0.46
-    low = centre[:, 2] < belt
-    front = centre[:, 0] > split
+    column = (np.asarray(mesh.faces) % POINTS + POINTS // 2) % POINTS - POINTS // 2
+    low = np.abs(column).max(axis=1) > BELT
+    front = mesh.triangles_center[:, 0] > mouse.length * (0.5 - mouse.split)
     looks = []
     for mask, rgba in (
         (low, mouse.sides),

@@ -82,7 +82,7 @@ def design(index: int) -> Hat:
     if index == 0:
         return Hat()
     rng = specimen_rng("hat", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     # Height, power, taper, pinch; front, side, back, droop and curve of the brim.
     low, high = {
         "cap": (
@@ -172,15 +172,18 @@ def _crown(hat: Hat) -> Piece:
     )
     if hat.style != "cap" or hat.accent[0] < 0.85:
         return piece
-    return Piece((*_front_panels(piece.visual[0]), *piece.visual[1:]), piece.collision, piece.mass)
+    return Piece(
+        (*_front_panels(hat, piece.visual[0]), *piece.visual[1:]), piece.collision, piece.mass
+    )
 
 
-def _front_panels(shape: Shape) -> tuple[Shape, ...]:
+def _front_panels(hat: Hat, shape: Shape) -> tuple[Shape, ...]:
     """The outside of a trucker's cap: light front panels."""
     assert shape.mesh is not None
     x, y, _ = shape.mesh.triangles_center.T
     light: Colour = (0.92, 0.92, 0.90, 1.0)
-    return painted(shape.mesh, np.abs(np.arctan2(y, x)) < np.pi / 3, light, shape.rgba)
+    angle = np.arctan2(y / hat.width, x / hat.length)
+    return painted(shape.mesh, np.abs(angle) < np.pi / 3, light, shape.rgba)
 
 
 def _brim(hat: Hat, angle: Float[np.ndarray, "p"]) -> Float[np.ndarray, "rings p 3"]:

@@ -54,9 +54,9 @@ class Remote:
     style: Style = "television"
     length: float = 0.185
     broad: float = 0.056
-    slim: float = 0.040
+    slim: float = 0.036
     thick: float = 0.030
-    thin: float = 0.016
+    thin: float = 0.014
     corner: float = 0.012
     edge: float = 0.004
     density: float = 620.0
@@ -97,9 +97,9 @@ def design(index: int) -> Remote:
         style,
         length,
         broad,
-        round(broad * float(rng.uniform(0.64, 0.74)), 4),
+        round(broad * float(rng.uniform(0.60, 0.67)), 4),
         thick,
-        round(thick * float(rng.uniform(0.46, 0.56)), 4),
+        round(thick * float(rng.uniform(0.42, 0.50)), 4),
         corner=drawn(rng, 0.006, 0.016),
         edge=drawn(rng, 0.0025, 0.006),
         density=round(float(rng.uniform(540.0, 680.0)), 0),

@@ -13,18 +13,16 @@ import numpy as np
 from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
-from asset_pipeline.procedural.handles import ALONG_X, ALONG_Y, superellipse
+from asset_pipeline.procedural.handles import superellipse
+from asset_pipeline.procedural.mirror.airframe import fin, nacelle, propeller, wheel_on_leg
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, loft, print_on_face, rounded_rectangle
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
-from asset_pipeline.procedural.turned import turned
-from manipose_mj.poses import SymmetryGroup, compose, rotation_about
+from manipose_mj.poses import SymmetryGroup, compose
 
 GLASS: Colour = (0.16, 0.22, 0.32, 1.0)
-RUBBER: Colour = (0.11, 0.11, 0.12, 1.0)
-METAL: Colour = (0.72, 0.73, 0.75, 1.0)
 TAILWARDS = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])  # X up, Y to the tail
 Style = Literal["propeller", "biplane", "airliner"]
 
@@ -76,7 +74,7 @@ def design(index: int) -> Airplane:
     if index == 0:
         return Airplane()
     rng = specimen_rng("toy_airplane", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     # As shares of the length: span, girth, chord, taper, sweep, wing, thickness, tail, fin.
     low, high = {
         "propeller": (
@@ -119,15 +117,23 @@ def design(index: int) -> Airplane:
 def generate(index: int = 0) -> Specimen:
     """Instance `index`: nose along +x, the fuselage's axis at z = 0, its middle at the origin."""
     plane = design(index)
-    pieces = [*_fuselage(plane), *_wings(plane), *_tail(plane)]
+    pieces: list[Piece] = [*_fuselage(plane), *_wings(plane), *_tail(plane)]
+    girth = plane.girth
     if plane.style == "airliner":
-        pieces += [_engine(plane, side) for side in (-1.0, 1.0)]
-        feet = ((0.13, 0.0), (0.56, 0.30), (0.56, -0.30))
+        x = plane.length * (0.5 - plane.wing) + 0.42 * plane.chord - 0.34 * plane.sweep
+        for side in (-1.0, 1.0):
+            at = np.array([x, 0.17 * side * plane.span, -0.454 * girth])
+            pieces.append(nacelle(at, girth, rgba=plane.trim, density=plane.density))
+        wheel, feet = 0.20 * girth, ((0.13, 0.0), (0.56, 0.30), (0.56, -0.30))
     else:
-        pieces += _propeller(plane)
+        nose = plane.length / 2
+        pieces += propeller(nose, girth, plane.blades, rgba=plane.trim, density=plane.density)
         ahead = plane.wing - 0.2 * plane.chord / plane.length
-        feet = ((ahead, 0.55), (ahead, -0.55), (0.93, 0.0))
-    pieces += [piece for share, side in feet for piece in _wheel(plane, share, side)]
+        wheel, feet = 0.22 * girth, ((ahead, 0.55), (ahead, -0.55), (0.93, 0.0))
+    for share, side in feet:  # level with one another: the fuselage's axis is, too
+        x, _, rise = (float(v) for v in _line(plane, np.array(share)))
+        at, top = np.array([x, side * girth, -0.92 * girth]), rise - 0.1 * girth
+        pieces += wheel_on_leg(at, wheel, 0.14 * girth, top, density=plane.density)
     r = plane.girth / 2
     return rigid_specimen(
         "toy_airplane",
@@ -231,29 +237,6 @@ def _canopy(plane: Airplane) -> Piece:
     return solid_piece(loft(rings), parts, rgba=GLASS, density=plane.density)
 
 
-def _fin(
-    sections: Float[np.ndarray, "2 4"], upright: bool, *, rgba: Colour, density: float
-) -> Piece:
-    """A wing, tailplane or fin between two sections: x of the middle, chord, thickness, place along it.
-
-    Along y it is made at z = 0, `upright` along z at y = 0; the last section is rounded off.
-    """
-    root, tip = sections
-    along = np.array([0.0, 0.90, 0.97, 1.0])
-    shrink = np.array([1.0, 1.0, 0.90, 0.66])
-    loops = []
-    for share, small in zip(along, shrink, strict=True):
-        x, chord, thick, place = root + share * (tip - root)
-        flat = superellipse(2.6, 16) * np.array([chord, thick]) / 2 * small + [x, 0.0]
-        out = np.full(16, place)
-        loops.append(
-            np.stack([flat[:, 0], *((flat[:, 1], out) if upright else (out, flat[:, 1]))], 1)
-        )
-    stack = np.stack(loops)
-    parts = [convex_part(stack[[0, 1]].reshape(-1, 3)), convex_part(stack[[1, 3]].reshape(-1, 3))]
-    return solid_piece(loft_outwards(stack), parts, rgba=rgba, density=density)
-
-
 def _wings(plane: Airplane) -> list[Piece]:
     x = plane.length * (0.5 - plane.wing)
     heights = {
@@ -272,7 +255,7 @@ def _wings(plane: Airplane) -> list[Piece]:
                     [x - plane.sweep, plane.taper * plane.chord, 0.8 * plane.thick, tip],
                 ]
             )
-            wing = _fin(ends, False, rgba=plane.wings, density=plane.density)
+            wing = fin(ends, False, rgba=plane.wings, density=plane.density)
             pieces.append(placed(wing, compose(np.eye(3), np.array([0.0, 0.0, z]))))
     if plane.style == "biplane":
         pieces += [
@@ -287,7 +270,7 @@ def _strut(plane: Airplane, x: float, share: float, heights: tuple[float, ...]) 
     """An upright between a biplane's wings."""
     low, high = (0.0 if abs(share) < 0.1 else heights[0]), heights[1]
     ends = np.array([[x, 0.30 * plane.chord, 0.003, low], [x, 0.30 * plane.chord, 0.003, high]])
-    strut = _fin(ends, True, rgba=plane.trim, density=plane.density)
+    strut = fin(ends, True, rgba=plane.trim, density=plane.density)
     return placed(strut, compose(np.eye(3), np.array([0.0, share * plane.span, 0.0])))
 
 
@@ -295,94 +278,14 @@ def _tail(plane: Airplane) -> list[Piece]:
     x, radius, rise = (float(v) for v in _line(plane, np.array(0.90)))
     chord, swept = 0.52 * plane.chord, 0.30 * plane.sweep + 0.006
     thick = 0.75 * plane.thick
-    fin = np.array(
+    upright = np.array(
         [[x, 1.2 * chord, thick, rise], [x - swept, 0.66 * chord, thick, rise + radius + plane.fin]]
     )
-    pieces = [_fin(fin, True, rgba=plane.trim, density=plane.density)]
+    pieces = [fin(upright, True, rgba=plane.trim, density=plane.density)]
     for side in (-1.0, 1.0):
         ends = np.array(
             [[x, chord, thick, 0.0], [x - swept, 0.66 * chord, thick, side * plane.tail / 2]]
         )
-        half = _fin(ends, False, rgba=plane.wings, density=plane.density)
+        half = fin(ends, False, rgba=plane.wings, density=plane.density)
         pieces.append(placed(half, compose(np.eye(3), np.array([0.0, 0.0, rise]))))
     return pieces
-
-
-def _propeller(plane: Airplane) -> list[Piece]:
-    """A spinner and blades: one upright pair, or three of which one points up."""
-    r = 0.15 * plane.girth
-    profile = np.array([[0, 0], [r, 0], [0.94 * r, 0.5 * r], [0.6 * r, 1.3 * r], [0, 1.7 * r]])
-    spinner = placed(
-        turned(
-            profile,
-            (0, 0.5 * r, 1.3 * r, 1.7 * r),
-            bands=((1.0, plane.trim),),
-            density=plane.density,
-            sections=24,
-        ),
-        compose(ALONG_X[:3, :3], np.array([plane.length / 2, 0.0, 0.0])),
-    )
-    reach = 0.72 * plane.girth
-    sections = np.array(
-        [[0.0, 0.0030, 0.16 * plane.girth, 0.2 * r], [0.0, 0.0026, 0.20 * plane.girth, reach]]
-    )
-    blade = _fin(sections, True, rgba=METAL, density=plane.density)
-    hub = np.array([plane.length / 2 + 0.5 * r, 0.0, 0.0])
-    turns = [2 * np.pi * k / plane.blades for k in range(plane.blades)]
-    x_axis = np.array([1.0, 0.0, 0.0])
-    return [spinner, *(placed(blade, compose(rotation_about(x_axis, turn), hub)) for turn in turns)]
-
-
-def _wheel(plane: Airplane, share: float, side: float) -> tuple[Piece, Piece]:
-    """A wheel on a leg; all stand on one level, the fuselage's axis parallel to it.
-
-    Args:
-      plane: The aeroplane.
-      share: Its place from the nose, as a share of the length.
-      side: And sideways, as a share of the girth.
-    """
-    r, width = (0.20 if plane.style == "airliner" else 0.22) * plane.girth, 0.14 * plane.girth
-    profile = np.array([[0, -1], [0.8 * r, -1], [r, -0.6], [r, 0.6], [0.8 * r, 1], [0, 1]])
-    profile[:, 1] = width * profile[:, 1] + np.arange(len(profile)) * 1e-6
-    levels = (-width, -0.6 * width, 0.6 * width, width)
-    wheel = turned(profile, levels, bands=((np.inf, RUBBER),), density=plane.density, sections=24)
-    x, _, rise = (float(v) for v in _line(plane, np.array(share)))
-    at = np.array([x, side * plane.girth, -0.92 * plane.girth])
-    leg = np.array([[x, 0.006, 0.004, rise - 0.1 * plane.girth], [x, 0.006, 0.004, at[2]]])
-    strut = placed(
-        _fin(leg, True, rgba=METAL, density=plane.density),
-        compose(np.eye(3), np.array([0.0, at[1], 0.0])),
-    )
-    return placed(wheel, compose(ALONG_Y[:3, :3], at)), strut
-
-
-def _engine(plane: Airplane, side: float) -> Piece:
-    """A nacelle under the wing."""
-    r, half = 0.26 * plane.girth, 0.36 * plane.girth
-    profile = np.array(
-        [
-            [0, -half],
-            [0.6 * r, -half],
-            [r, -0.1 * half],
-            [r, 0.8 * half],
-            [0.86 * r, half],
-            [0, half],
-        ]
-    )
-    profile[:, 1] += np.arange(len(profile)) * 1e-6
-    levels = (-half, -0.1 * half, 0.8 * half, half)
-    nacelle = turned(
-        profile,
-        levels,
-        bands=((0.6 * half, plane.trim), (1.0, METAL)),
-        density=plane.density,
-        sections=28,
-    )
-    face = compose(np.eye(3), np.array([0.0, 0.0, half]))
-    intake = Shape(
-        "mesh", mesh=print_on_face(ellipse((0.7 * r, 0.7 * r), 24), face, 3), rgba=RUBBER
-    )
-    nacelle = Piece((*nacelle.visual, intake), nacelle.collision, nacelle.mass)
-    x = plane.length * (0.5 - plane.wing) + 0.42 * plane.chord - 0.34 * plane.sweep
-    at = np.array([x, 0.17 * side * plane.span, -0.22 * plane.girth - 0.9 * r])
-    return placed(nacelle, compose(ALONG_X[:3, :3], at))

@@ -15,27 +15,20 @@ from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import ALONG_Y, superellipse
+from asset_pipeline.procedural.handles import superellipse
+from asset_pipeline.procedural.mirror.car_parts import CHROME, arch, lamps, pane, road_wheel
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import (
     box,
-    ellipse,
     loft,
-    print_on_face,
     rounded_box,
     rounded_rectangle,
 )
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
-from asset_pipeline.procedural.turned import turned
-from manipose_mj.poses import SymmetryGroup, compose, rotation_about
+from manipose_mj.poses import SymmetryGroup, compose
 
-GLASS: Colour = (0.14, 0.18, 0.24, 1.0)
-RUBBER: Colour = (0.10, 0.10, 0.11, 1.0)
-CHROME: Colour = (0.80, 0.81, 0.83, 1.0)
-LAMP: Colour = (0.97, 0.95, 0.82, 1.0)
-TAIL_LAMP: Colour = (0.72, 0.06, 0.06, 1.0)
 Style = Literal["saloon", "hatchback", "sports", "van", "pickup"]
 
 
@@ -95,7 +88,7 @@ def design(index: int) -> Car:
     if index == 0:
         return Car()
     rng = specimen_rng("toy_car", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     length = float(np.exp(rng.uniform(np.log(0.072), np.log(0.185))))
     # Belt, roof, nose, boot as shares of the length; screen, front, rear, back; wheel.
     belt, roof, nose, boot, screen, front, rear, back, wheel = {
@@ -133,11 +126,13 @@ def design(index: int) -> Car:
 def generate(index: int = 0) -> Specimen:
     """Instance `index`: front along +x, wheels on z = 0."""
     car = design(index)
-    pieces = [
-        _body(car),
-        _cabin(car),
-        *(_wheel(car, a, s) for a in (-1.0, 1.0) for s in (-1.0, 1.0)),
-    ]
+    pieces = [_body(car), _cabin(car)]
+    for end in (-0.5, 0.5):
+        for side in (-1.0, 1.0):
+            wheel = road_wheel(car.wheel, car.tyre, side, rims=car.rims, density=car.density)
+            out = side * (car.width / 2 - 0.82 * car.tyre)
+            at = np.array([end * car.base * car.length, out, car.wheel])
+            pieces.append(placed(wheel, compose(np.eye(3), at)))
     if car.style == "pickup":
         pieces += _bed(car)
     return rigid_specimen(
@@ -195,53 +190,14 @@ def _body(car: Car) -> Piece:
     body = solid_piece(
         loft_outwards(loops), convex_chunks(loops, cuts), rgba=car.colour, density=car.density
     )
-    return Piece((*body.visual, *_lamps(car), *_arches(car)), body.collision, body.mass)
-
-
-def _lamps(car: Car) -> list[Shape]:
-    """Head lamps and grille in front, tail lamps and a number plate behind; flat prints."""
-    shapes = []
-    for end, height in ((1.0, car.nose), (-1.0, car.boot)):
-        facing = np.array([[0.0, 0, end], [end, 0, 0], [0, 1, 0]])
-        tall = height - car.clearance
-        at = np.array([end * car.length / 2, 0.0, car.clearance + 0.52 * tall])
-        lamp = (
-            ellipse((0.16 * tall, 0.16 * tall), 16)
-            if end > 0
-            else rounded_rectangle((0.09 * car.width, 0.10 * tall), 1e-4, 1)
-        )
-        for side in (-1.0, 1.0):
-            pose = compose(facing, at + [0, 0.31 * side * car.width, 0.05 * tall])
-            shapes.append(
-                Shape(
-                    "mesh", mesh=print_on_face(lamp, pose, 2), rgba=LAMP if end > 0 else TAIL_LAMP
-                )
-            )
-        plate = rounded_rectangle((0.17 * car.width, (0.15 if end > 0 else 0.10) * tall), 1e-4, 1)
-        pose = compose(facing, at - [0, 0, 0.02 * tall])
-        shapes.append(
-            Shape("mesh", mesh=print_on_face(plate, pose, 2), rgba=RUBBER if end > 0 else LAMP)
-        )
-    return shapes
-
-
-def _axle(car: Car, end: float) -> float:
-    return end * car.base * car.length / 2
-
-
-def _arches(car: Car) -> list[Shape]:
-    """Dark wheel arches on the sides."""
-    radius, shapes = 1.12 * car.wheel, []
-    floor = car.clearance - car.wheel + 0.12 * (car.belt - car.clearance)
-    start = np.arcsin(np.clip(floor / radius, -1, 1))
-    angles = np.linspace(start, np.pi - start, 20)
-    arch = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    looks = lamps(car.length, car.width, (car.clearance, car.nose), front=True)
+    looks += lamps(car.length, car.width, (car.clearance, car.boot), front=False)
+    floor = car.clearance + 0.12 * (car.belt - car.clearance)
     for side in (-1.0, 1.0):
-        facing = np.stack([[-side, 0, 0], [0, 0, 1], [0, side, 0]], axis=1).astype(float)
-        for end in (-1.0, 1.0):
-            pose = compose(facing, np.array([_axle(car, end), side * car.width / 2, car.wheel]))
-            shapes.append(Shape("mesh", mesh=print_on_face(arch, pose, 1), rgba=RUBBER))
-    return shapes
+        for end in (-0.5, 0.5):
+            at = np.array([end * car.base * car.length, side * car.width / 2, car.wheel])
+            looks.append(arch(at, 1.12 * car.wheel, floor))
+    return Piece((*body.visual, *looks), body.collision, body.mass)
 
 
 def _cabin(car: Car) -> Piece:
@@ -276,8 +232,9 @@ def _cabin(car: Car) -> Piece:
     ]
     (xb, xs), (xr, xf) = base[0], lid[0]
     b, t = car.belt, car.roof
-    looks.append(_window((xs, -low, b), (xs, low, b), (xf, high, t), (xf, -high, t), 0.12))
-    looks.append(_window((xb, low, b), (xb, -low, b), (xr, -high, t), (xr, high, t), 0.14))
+    screen = [(xs, -low, b), (xs, low, b), (xf, high, t), (xf, -high, t)]
+    rear = [(xb, low, b), (xb, -low, b), (xr, -high, t), (xr, high, t)]
+    looks += [pane(screen, 0.12), pane(rear, 0.14)]
     for s in (-1.0, 1.0):
         panes = ((0.0, 0.46), (0.46, 1.0))
         if car.style == "van":
@@ -295,56 +252,8 @@ def _cabin(car: Car) -> Piece:
                 (xs_high[1], s * high, t),
                 (xs_high[0], s * high, t),
             ]
-            looks.append(_window(*(corners if s < 0 else [corners[k] for k in (1, 0, 3, 2)]), 0.10))
+            looks.append(pane(corners if s < 0 else [corners[k] for k in (1, 0, 3, 2)], 0.10))
     return Piece(tuple(looks), tuple(parts), mass)
-
-
-def _window(
-    a: tuple[float, float, float],
-    b: tuple[float, float, float],
-    c: tuple[float, float, float],
-    d: tuple[float, float, float],
-    margin: float,
-) -> Shape:
-    """A pane on a flat face: its lower corners, then its upper ones, anticlockwise from outside."""
-    corners = np.array([a, b, c, d])
-    centre = corners.mean(axis=0)
-    across = corners[1] - corners[0]
-    across = across / np.linalg.norm(across)
-    out = np.cross(across, corners[2] - corners[1])
-    out = out / np.linalg.norm(out)
-    facing = np.stack([across, np.cross(out, across), out], axis=1)
-    flat = (corners - centre) @ facing[:, :2]
-    wide, tall = np.ptp(flat, axis=0)
-    frame = 2 * margin * min(wide, tall)
-    inner = flat * (1 - frame / np.array([wide, tall]))
-    # Corners cut off, so that they look rounded.
-    ahead, behind = np.roll(inner, -1, axis=0) - inner, np.roll(inner, 1, axis=0) - inner
-    cut = 0.12 * tall
-    steps = [cut * v / np.linalg.norm(v, axis=1, keepdims=True) for v in (behind, ahead)]
-    outline = np.stack([inner + steps[0], inner + steps[1]], axis=1).reshape(-1, 2)
-    return Shape("mesh", mesh=print_on_face(outline, compose(facing, centre), 2), rgba=GLASS)
-
-
-def _wheel(car: Car, end: float, side: float) -> Piece:
-    """A tyre with a rim, its outer face a little outside the body's side."""
-    r, w = car.wheel, car.tyre
-    profile = np.array(
-        [[0, 0], [0.9 * r, 1e-6], [r, 0.14 * w], [r, 0.86 * w], [0.92 * r, w], [0.70 * r, w + 1e-6]]
-        + [[0.62 * r, w + 2e-6], [0.22 * r, w + 3e-6], [0.18 * r, 1.04 * w], [0, 1.04 * w + 1e-6]]
-    )
-    wheel = turned(
-        profile,
-        (0.0, w),
-        bands=((w + 1e-6, RUBBER), (1.0, car.rims)),
-        density=car.density,
-        sections=24,
-    )
-    tyre = Shape("cylinder", (r, w / 2), compose(np.eye(3), np.array([0.0, 0.0, w / 2])))
-    wheel = Piece(wheel.visual, (tyre,), wheel.mass)
-    turn = rotation_about(np.array([0.0, 0.0, 1.0]), 0.0 if side > 0 else np.pi) @ ALONG_Y[:3, :3]
-    at = np.array([_axle(car, end), side * (car.width / 2 - 0.82 * w), r])
-    return placed(wheel, compose(turn, at))
 
 
 def _bed(car: Car) -> list[Piece]:

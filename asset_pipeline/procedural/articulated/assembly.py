@@ -1,0 +1,70 @@
+"""A base and its moving parts, put together from pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from asset_pipeline.assets import Cavity, MovingPart
+from asset_pipeline.geometry import Body, Joint
+from asset_pipeline.labelling.articulated_label import articulated_label
+from asset_pipeline.mass import combine
+from asset_pipeline.procedural.articulated.mounted import Mounted
+from asset_pipeline.procedural.pieces import Piece
+from asset_pipeline.procedural.specimen import Specimen
+
+
+@dataclass(frozen=True)
+class Part:
+    """A moving part: its body, and what `asset.json` says of it."""
+
+    body: Body
+    entry: MovingPart
+
+
+def body_of(
+    name: str, pieces: Sequence[Piece], joint: Joint | None = None, *, balanced: float = 0.0
+) -> Body:
+    """A rigid body made of pieces; `joint` and `balanced` as in `Body`."""
+    return Body(
+        name=name,
+        collision=tuple(s for piece in pieces for s in piece.collision),
+        visual=tuple(s for piece in pieces for s in piece.visual),
+        mass_properties=combine([piece.mass for piece in pieces]),
+        joint=joint,
+        balanced=balanced,
+    )
+
+
+def moving(
+    name: str,
+    pieces: Sequence[Piece],
+    handle: Mounted,
+    joint: Joint,
+    cavity: Cavity,
+    *,
+    balanced: float = 0.0,
+) -> Part:
+    """A drawer or a door: what it is made of, its handle, its joint and the space it opens."""
+    body = body_of(name, [*pieces, handle.piece], joint, balanced=balanced)
+    return Part(body, MovingPart(name, joint, handle.label, cavity))
+
+
+def articulated_specimen(base: Sequence[Piece], parts: Sequence[Part]) -> Specimen:
+    """The whole, everything shut; the front is towards -x."""
+    bodies = (body_of("base", base), *(part.body for part in parts))
+    return Specimen(articulated_label(bodies), bodies, tuple(part.entry for part in parts))
+
+
+def space_between(
+    low: Float[np.ndarray, "3"] | tuple[float, float, float],
+    high: Float[np.ndarray, "3"] | tuple[float, float, float],
+    *,
+    moves_with_part: bool,
+) -> Cavity:
+    """The cavity between two corners."""
+    lower, upper = np.asarray(low, float), np.asarray(high, float)
+    return Cavity((lower + upper) / 2, upper - lower, moves_with_part)

@@ -1,0 +1,343 @@
+"""Small valid objects in every publisher's layout, and hypothesis strategies that damage them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scan_files as files
+from hypothesis import strategies as st
+
+Files = dict[str, bytes]
+Draw = Callable[[Any], Any]
+SIZE = (0.08, 0.06, 0.12)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A data set of one object, damaged.
+
+    Attributes:
+      source: Whose layout.
+      damage: What was done to it.
+      content: Its files.
+      archive: Ending of the archive that it comes in; empty for a folder.
+      cut: Where the archive was cut off, as a share of its length; 1 leaves it whole.
+    """
+
+    source: str
+    damage: str
+    content: Files
+    archive: str
+    cut: float = 1.0
+
+    def write(self, root: Path) -> Path:
+        """Write it below `root` and return what a reader is given."""
+        if not self.archive:
+            folder = root / "data"
+            folder.mkdir(parents=True)
+            return files.write_folder(folder, self.content)
+        path = root / f"001_thing_google_16k{self.archive}"
+        files.write_archive(path, self.content)
+        path.write_bytes(path.read_bytes()[: int(self.cut * path.stat().st_size)])
+        return path
+
+
+def valid(source: str) -> Files:
+    """An undamaged object."""
+    box = files.box(SIZE)
+    if source == "ycb":
+        home = "001_thing/google_16k/"
+        return {
+            f"{home}textured.obj": files.obj(box),
+            f"{home}textured.mtl": b"newmtl material_0\nmap_Kd texture_map.png\n",
+            f"{home}texture_map.png": files.image(),
+        }
+    if source == "google_scanned_objects":
+        home = "models/Thing/"
+        return {f"{home}model.obj": files.obj(box), f"{home}texture.png": files.image()}
+    if source == "omniobject3d":
+        home = "raw_scans/box/box_001/Scan/Scan"
+        return {f"{home}.obj": files.obj(box.apply_scale(1000)), f"{home}.jpg": files.jpeg()}
+    if source == "pace":
+        size = {f"size_{axis}": 1000 * s for axis, s in zip("xyz", SIZE, strict=True)}
+        info = {"1": {"identifier": "box/001", "diameter": 156.0, **size}}
+        return {
+            "models/obj_000001.ply": files.meshlab_ply(box.apply_scale(1000), "obj_000001.png"),
+            "models/obj_000001.png": files.image(),
+            "models/models_info.json": json.dumps(info).encode(),
+        }
+    return _cabinet("dataset/4711/")
+
+
+SOURCES = ("ycb", "google_scanned_objects", "omniobject3d", "pace", "partnet_mobility")
+
+URDF = """<?xml version="1.0"?>
+<robot name="thing">
+<link name="base"/>
+<link name="link_0"><visual name="body-0"><origin xyz="0 0 0"/>
+  <geometry><mesh filename="textured_objs/original-0.obj"/></geometry></visual></link>
+<link name="link_1"><visual name="cabinet_door_surface-1"><origin xyz="-0.5 0 -0.5"/>
+  <geometry><mesh filename="textured_objs/original-1.obj"/></geometry></visual></link>
+<joint name="joint_0" type="fixed"><origin rpy="1.5707963 0 -1.5707963" xyz="0 0 0"/>
+  <child link="link_0"/><parent link="base"/></joint>
+<joint name="joint_1" type="revolute"><origin xyz="0.5 0 0.5"/><axis xyz="0 1 0"/>
+  <child link="link_1"/><parent link="link_0"/><limit lower="0" upper="1.57"/></joint>
+</robot>
+"""
+
+
+def _cabinet(home: str) -> Files:
+    body, door = files.box((1.0, 0.9, 1.0)), files.box((1.0, 0.9, 0.05))
+    body.apply_translation([0, 0, -0.5])
+    door.apply_translation([0, 0, 0.5])
+    return {
+        f"{home}mobility.urdf": URDF.encode(),
+        f"{home}textured_objs/original-0.obj": files.obj(body),
+        f"{home}textured_objs/original-1.obj": files.obj(door),
+        f"{home}textured_objs/material.mtl": b"newmtl material_0\nmap_Kd ../images/wood.png\n",
+        f"{home}images/wood.png": files.image(),
+        f"{home}semantics.txt": b"link_0 heavy furniture_body\nlink_1 hinge rotation_door\n",
+        f"{home}meta.json": b'{"model_cat": "StorageFurniture"}',
+        f"{home}mobility_v2.json": b'[{"id": 1, "jointData": {"limit": {"a": 0, "b": 90}}}]',
+    }
+
+
+@st.composite
+def cases(draw: Draw, sources: tuple[str, ...] = SOURCES) -> Case:
+    """A damaged data set."""
+    source = draw(st.sampled_from(sources))
+    content = valid(source)
+    damages = ANY | (URDFS if source == "partnet_mobility" else {})
+    damage = draw(st.sampled_from(sorted(damages)))
+    content = damages[damage](draw, content)
+    archives = [".tgz"] if source == "ycb" else ["", ".zip", ".tgz"]
+    if any(not re.fullmatch(r"[\w/]+[\w./-]*", n) or ".." in n for n in content):
+        damage, archive = "path escape", draw(st.sampled_from([a for a in archives if a]))
+    elif source == "ycb":
+        archive = draw(st.sampled_from(["", ".tgz"]))
+    else:
+        archive = draw(st.sampled_from(archives))
+    if archive and damage == "truncated" and draw(st.booleans()):
+        return Case(source, "truncated archive", valid(source), archive, draw(st.floats(0, 0.999)))
+    return Case(source, damage, content, archive)
+
+
+def _some(draw: Draw, content: Files, ending: str) -> str:
+    return draw(st.sampled_from(sorted(n for n in content if re.search(ending, n))))
+
+
+MESH = r"\.(obj|ply)$"
+
+
+def _truncated(draw: Draw, content: Files) -> Files:
+    name = _some(draw, content, "")
+    return content | {name: content[name][: draw(st.integers(0, len(content[name]) - 2))]}
+
+
+def _flipped(draw: Draw, content: Files) -> Files:
+    name = _some(draw, content, "")
+    data = bytearray(content[name])
+    for place in draw(st.lists(st.integers(0, len(data) - 1), min_size=1, max_size=20)):
+        data[place] ^= draw(st.integers(1, 255))
+    return content | {name: bytes(data)}
+
+
+def _garbage(draw: Draw, content: Files) -> Files:
+    return content | {_some(draw, content, ""): draw(st.binary(max_size=300))}
+
+
+def _empty(draw: Draw, content: Files) -> Files:
+    return content | {_some(draw, content, ""): b""}
+
+
+def _missing(draw: Draw, content: Files) -> Files:
+    gone = _some(draw, content, "")
+    return {n: c for n, c in content.items() if n != gone}
+
+
+def _with_vertices(content: Files, name: str, change: Callable[[list[str], int], Any]) -> Files:
+    """Every line of a vertex, its three coordinates changed by `change(coordinates, number)`."""
+    lines = content[name].decode().split("\n")
+    is_ply = name.endswith(".ply")
+    count = 0
+    for i, line in enumerate(lines):
+        fields = line.split(" ")
+        first = 0 if is_ply else 1
+        vertex = len(fields) == 5 if is_ply else fields[0] == "v"
+        if vertex and re.match(r"[-\d]", fields[first]):
+            fields[first : first + 3] = [str(v) for v in change(fields[first : first + 3], count)]
+            lines[i] = " ".join(fields)
+            count += 1
+    return content | {name: "\n".join(lines).encode()}
+
+
+def _nan(draw: Draw, content: Files) -> Files:
+    bad = draw(st.sampled_from(["nan", "inf", "-inf", "1e999", "-nan", "", "0x10", "1,5", "--1"]))
+    which, axis = draw(st.integers(0, 7)), draw(st.integers(0, 2))
+
+    def change(values: list[str], number: int) -> list[str]:
+        return [bad if (number, i) == (which, axis) else v for i, v in enumerate(values)]
+
+    return _with_vertices(content, _some(draw, content, MESH), change)
+
+
+def _zero_area(draw: Draw, content: Files) -> Files:
+    kept = draw(st.sampled_from([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 1, 1)]))
+
+    def change(values: list[str], number: int) -> list[float]:
+        return [float(v) * k for v, k in zip(values, kept, strict=True)]
+
+    return _with_vertices(content, _some(draw, content, MESH), change)
+
+
+def _scaled(draw: Draw, content: Files, factors: list[float]) -> Files:
+    factor = draw(st.sampled_from(factors))
+    for name in [n for n in content if re.search(MESH, n)]:
+        content = _with_vertices(content, name, lambda v, _: [factor * float(x) for x in v])
+    return content
+
+
+def _gigantic(draw: Draw, content: Files) -> Files:
+    return _scaled(draw, content, [1e5, 1e9, 1e20, 1e38, 1e150, 1e300])
+
+
+def _units(draw: Draw, content: Files) -> Files:
+    return _scaled(draw, content, [0.001, 0.01, 0.0254, 39.37, 100.0, 1000.0])
+
+
+def _one_far_vertex(draw: Draw, content: Files) -> Files:
+    far = draw(st.sampled_from(["1e6", "1e30", "1e300"]))
+    which = draw(st.integers(0, 7))
+    return _with_vertices(
+        content, _some(draw, content, MESH), lambda v, n: [far, *v[1:]] if n == which else v
+    )
+
+
+def _inverted(draw: Draw, content: Files) -> Files:
+    """All faces, or some, the wrong way round."""
+    name = _some(draw, content, MESH)
+    turned = draw(st.sets(st.integers(0, 11), min_size=1)) if draw(st.booleans()) else range(12)
+    lines = content[name].decode().split("\n")
+    faces = [i for i, line in enumerate(lines) if re.match(r"f |3 \d+ \d+ \d+ 6", line)]
+    for i in np.array(faces)[sorted(turned)]:
+        fields = lines[i].split(" ")
+        fields[1:4] = fields[3:0:-1]
+        lines[i] = " ".join(fields)
+    return content | {name: "\n".join(lines).encode()}
+
+
+def _wrong_index(draw: Draw, content: Files) -> Files:
+    name = _some(draw, content, MESH)
+    index = draw(st.sampled_from(["0", "-1", "-99", "99", "4294967296", "99999999999999999999"]))
+    pattern = rb"(?m)^f \d+/\d+" if name.endswith(".obj") else rb"(?m)^3 \d+(?= \d+ \d+ 6)"
+    text = f"f {index}/1" if name.endswith(".obj") else f"3 {index}"
+    return content | {name: re.sub(pattern, text.encode(), content[name], count=1)}
+
+
+def _huge_count(draw: Draw, content: Files) -> Files:
+    """A PLY that announces more than it has; an OBJ with a polygon of one corner."""
+    name = _some(draw, content, MESH)
+    count = draw(st.sampled_from([b"9", b"1000000000000", b"-3", b"x"]))
+    what = draw(st.sampled_from([b"vertex", b"face"]))
+    data = re.sub(rb"element %s \d+" % what, b"element %s %s" % (what, count), content[name])
+    return content | {name: data if data != content[name] else data + b"f 1\n"}
+
+
+def _reference(draw: Draw, content: Files) -> Files:
+    """Textures and material libraries outside the folder."""
+    to = draw(st.sampled_from([b"../../../../etc/passwd", b"/etc/passwd", b"C:\\x.png", b"a\0b"]))
+    name = _some(draw, content, r"\.(obj|ply|mtl)$")
+    pattern = rb"(?m)^(mtllib|map_Kd|comment TextureFile) .*$"
+    return content | {name: re.sub(pattern, lambda m: m[1] + b" " + to, content[name])}
+
+
+def _escape(draw: Draw, content: Files) -> Files:
+    name = draw(
+        st.sampled_from(
+            ["../evil", "../../evil", "/evil", "x/../../evil", "..\\evil", "./../evil", "x/.."]
+        )
+    )
+    return content | {name: b"evil"}
+
+
+ANY: dict[str, Callable[[Draw, Files], Files]] = {
+    "truncated": _truncated,
+    "bytes flipped": _flipped,
+    "garbage": _garbage,
+    "empty": _empty,
+    "missing": _missing,
+    "NaN": _nan,
+    "zero area": _zero_area,
+    "gigantic": _gigantic,
+    "wrong units": _units,
+    "one far vertex": _one_far_vertex,
+    "inverted": _inverted,
+    "wrong index": _wrong_index,
+    "wrong count": _huge_count,
+    "foreign reference": _reference,
+    "path escape": _escape,
+}
+
+
+def _urdf(old: str, *new: str) -> Callable[[Draw, Files], Files]:
+    def damage(draw: Draw, content: Files) -> Files:
+        name = _some(draw, content, "urdf$")
+        text = URDF.replace(old, draw(st.sampled_from(new)))
+        assert text != URDF
+        return content | {name: text.encode()}
+
+    return damage
+
+
+BOMB = "".join(
+    f'<!ENTITY a{i} "{f"&a{i - 1};" * 10 if i else "lol"}">' for i in range(10)
+)  # ten thousand million "lol"
+
+
+def _odd_json(draw: Draw, content: Files) -> Files:
+    values = st.recursive(
+        st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(st.sampled_from(["id", "jointData", "limit", "model_cat"]), inner)
+        ),
+        max_leaves=8,
+    )
+    text = json.dumps(draw(values)) if draw(st.booleans()) else "[" * 100_000
+    return content | {_some(draw, content, r"json$"): text.encode()}
+
+
+URDFS: dict[str, Callable[[Draw, Files], Files]] = {
+    "cyclic URDF": _urdf(
+        '<parent link="base"/>', '<parent link="link_1"/>', '<parent link="link_0"/>'
+    ),
+    "entity expansion": _urdf(
+        "<robot",
+        f"<!DOCTYPE robot [{BOMB}]><robot title='&a9;'",
+        "<!DOCTYPE robot [<!ENTITY a SYSTEM 'file:///etc/passwd'>]><robot",
+    ),
+    "mesh outside": _urdf(
+        "textured_objs/original-1.obj",
+        "../../../../etc/passwd",
+        "/etc/passwd",
+        "file:///etc/passwd",
+        "textured_objs/../../../x.obj",
+    ),
+    "mesh missing": _urdf(
+        "textured_objs/original-1.obj", "textured_objs/original-9.obj", "textured_objs"
+    ),
+    "URDF number": _urdf(
+        'upper="1.57"', 'upper="nan"', 'upper="-9"', 'upper="1e300"', 'upper=""', 'upper="1e9"'
+    ),
+    "URDF axis": _urdf(
+        '<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', '<axis xyz="1"/>', '<axis xyz="inf 0 0"/>'
+    ),
+    "URDF links": _urdf('<link name="base"/>', "", '<link name="link_0"/>', "<link/>" * 3000),
+    "odd JSON": _odd_json,
+}
