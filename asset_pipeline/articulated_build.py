@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.articulated_scan import ArticulatedScan, LinkRole, PartMesh, ScanLink
 from asset_pipeline.assets import Asset, Cavity, MovingPart
 from asset_pipeline.emit import write_asset
 from asset_pipeline.geometry import Body, Joint, MassProperties, Shape
+from asset_pipeline.labelling.articulated_label import articulated_label
 from asset_pipeline.labelling.cavities import cavity_behind
 from asset_pipeline.labelling.handle_label import handle_label
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.link_looks import link_looks
 from asset_pipeline.link_shapes import HANDLE, link_shapes
 from asset_pipeline.mass import shape_mass_properties
-from manipose_mj.poses import SymmetryGroup
 
 GRAVITY = 9.81  # [m/s^2]
 # Densities [kg/m^3]. An appliance's walls and doors are sheets around foam, glass wool and air: a
@@ -94,7 +93,7 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
             name=scan.name,
             kind="articulated",
             category=scan.category,
-            label=_label(bodies),
+            label=articulated_label(bodies),
             up=np.array([0.0, 0.0, 1.0]),
             mass_properties=bodies[0].mass_properties,
             stable_poses=(),
@@ -202,20 +201,6 @@ def _cavity(
     far = 0 if outwards[axis] > 0 else 1
     region[far, axis] = boxes["base"][far, axis]
     return cavity_behind(own, others, region, -outwards, moves_with_part=False)
-
-
-def _label(bodies: list[Body]) -> PoseLabel:
-    surface = trimesh.util.concatenate([body.surface() for body in bodies])
-    low, high = surface.bounds
-    # X up, Y out of the front, Z to the left of who stands before it.
-    rotation = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-    return PoseLabel(
-        origin=(low + high) / 2,
-        rotation=rotation,
-        object_type="articulated",
-        extents=np.abs(rotation.T @ (high - low)),
-        symmetry=SymmetryGroup.identity(),
-    )
 
 
 def _bounds(shapes: list[Shape]) -> Float[np.ndarray, "2 3"]:

@@ -38,6 +38,7 @@ from asset_pipeline.labelling.label import (
     symmetry_from_bop,
     symmetry_to_bop,
 )
+from asset_pipeline.labelling.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 from manipose_mj.poses import (
     pose_to_vector,
@@ -60,6 +61,7 @@ def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
         "units": {"length": "m", "mass": "kg", "angle": "rad"},
         "up": rounded(asset.up),
         "label": _label_to_json(asset.label),
+        "label_quality": _quality_to_json(asset.label_quality),
         "mass_properties": {
             "mass": float(asset.mass_properties.mass),
             "center_of_mass": rounded(asset.mass_properties.center_of_mass),
@@ -141,6 +143,7 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
             _area(path, entry, i) for i, entry in enumerate(typed(path, document, "areas", list))
         ),
         grasps=_read_grasps(folder / GRASPS_FILE, len(stable)),
+        label_quality=_quality(path, document.get("label_quality")),
     )
 
 
@@ -196,6 +199,30 @@ def _label(path: Path, document: dict[str, Any], name: str) -> PoseLabel:
         object_type=object_type,  # pyright: ignore[reportArgumentType]
         extents=extents,
         symmetry=symmetry,
+    )
+
+
+def _quality_to_json(quality: LabelQuality | None) -> dict[str, Any] | None:
+    if quality is None:
+        return None
+    residuals = {name: round(float(value), 9) for name, value in quality.residuals.items()}
+    return {"confidence": round(quality.confidence, 6), "residuals": residuals}
+
+
+def _quality(path: Path, document: Any) -> LabelQuality | None:
+    if document is None:
+        return None
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: field 'label_quality' is not an object or null")
+    confidence = number(path, document, "confidence", "label_quality.confidence")
+    if not 0 <= confidence <= 1:
+        raise InputError(
+            f"{path}: field 'label_quality.confidence' is {confidence:g}; expected 0 to 1"
+        )
+    residuals = typed(path, document, "residuals", dict, "label_quality.residuals")
+    return LabelQuality(
+        confidence,
+        {key: number(path, residuals, key, f"label_quality.residuals.{key}") for key in residuals},
     )
 
 

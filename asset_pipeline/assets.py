@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from asset_pipeline.geometry import Joint, MassProperties
 from asset_pipeline.labelling.label import PoseLabel
+from asset_pipeline.labelling.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
 
@@ -123,7 +124,10 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Asset:
-    """A built asset, as read from its folder. Fields as in `asset.json`."""
+    """A built asset, as read from its folder. Fields as in `asset.json`.
+
+    `label_quality` is None where the label was not measured: made with the shape, or set by a person.
+    """
 
     folder: Path
     name: str
@@ -137,6 +141,7 @@ class Asset:
     parts: tuple[MovingPart, ...] = ()
     areas: tuple[Area, ...] = ()
     grasps: GraspSet | None = None
+    label_quality: LabelQuality | None = None
 
     @property
     def model_path(self) -> Path:

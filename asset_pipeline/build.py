@@ -141,13 +141,14 @@ def build_item(
 
 def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> Asset:
     """Label, decompose and weigh one scan, and write its asset folder."""
-    label, _ = scan_label(
+    label, quality = scan_label(
         scan.mesh,
         scan.object_type,
         scan.up,
         category=scan.category,
         functional=scan.functional,
         textured=scan.texture is not None,
+        texture=scan.texture,
     )
     measured = Asset(
         folder=folder,
@@ -159,6 +160,7 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
         mass_properties=scan_mass_properties(scan),
         stable_poses=(),
         provenance=replace(scan.provenance, generator=generator()),
+        label_quality=quality,
     )
     draft = measured
     if override is not None:
@@ -184,6 +186,7 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
             up=draft.up,
             body=body,
             provenance=draft.provenance,
+            label_quality=draft.label_quality,
         )
     if override is not None:
         write_measured(folder, measured)

@@ -20,7 +20,7 @@ from asset_pipeline.limited_call import (
     end_if_orphaned,
     limited_call,
 )
-from asset_pipeline.staging import PREFIX, put_in_place, staging
+from asset_pipeline.staging import PREFIX, clear_staging, put_in_place, staging
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -88,15 +88,26 @@ def carry_out(
     Returns:
       One result an object, sorted by name.
     """
+    parents = {order.folder.parent for order in orders}
     results = []
     calls = (delayed(_carried_out)(order) for order in orders)
-    for result in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
-        results.append(result)
-        for warning in result.warnings:
-            log.warning("%s: %s", result.name, warning)
-        if progress is not None:
-            progress(result, len(orders))
+    try:
+        _clear(parents)
+        for result in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
+            results.append(result)
+            for warning in result.warnings:
+                log.warning("%s: %s", result.name, warning)
+            if progress is not None:
+                progress(result, len(orders))
+    except BaseException:  # the workers are killed when we are interrupted
+        _clear(parents)
+        raise
     return sorted(results, key=lambda r: r.name)
+
+
+def _clear(parents: set[Path]) -> None:
+    for parent in parents:
+        clear_staging(parent)
 
 
 def _carried_out(order: Order) -> BuildResult:

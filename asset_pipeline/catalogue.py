@@ -117,7 +117,7 @@ CATALOGUE: dict[str, Category] = {
         Category("remote", "mirror", "none", (0.10, 0.24), 52),
         Category("steel_tape", "mirror", "none", (0.05, 0.09), 52),
         Category("teapot", "mirror", "none", (0.16, 0.27), 52),
-        Category("tissue", "mirror", "half turn", (0.11, 0.26), 52),
+        Category("tissue", "mirror", "varies", (0.11, 0.26), 52),
         Category("toy_airplane", "mirror", "none", (0.10, 0.28), 52),
         Category("toy_car", "mirror", "none", (0.06, 0.22), 52),
         Category("wallet", "mirror", "varies", (0.09, 0.20), 52),

@@ -15,6 +15,7 @@ from asset_pipeline.geometry import Body
 from asset_pipeline.grasp_trial import with_trials
 from asset_pipeline.grasps import sample_grasps
 from asset_pipeline.labelling.label import PoseLabel
+from asset_pipeline.labelling.label_quality import LabelQuality
 from asset_pipeline.rest_scene import scratch_model
 from asset_pipeline.stable_poses import stable_poses, verified
 
@@ -32,6 +33,7 @@ def finish_rigid(
     body: Body,
     provenance: Provenance,
     areas: tuple[Area, ...] = (),
+    label_quality: LabelQuality | None = None,
 ) -> Asset:
     """Compute the rest poses and the grasps of a rigid object and write its asset folder.
 
@@ -44,6 +46,7 @@ def finish_rigid(
       body: Collision shapes, looks and mass.
       provenance: Where it came from.
       areas: Where it is held and where it does its work, in the label frame.
+      label_quality: How sure a measured label is.
 
     Returns:
       The asset as read back from its folder.
@@ -70,5 +73,6 @@ def finish_rigid(
         provenance=provenance,
         areas=areas,
         grasps=grasps,
+        label_quality=label_quality,
     )
     return write_asset(asset, (body,))

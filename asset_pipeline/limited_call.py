@@ -21,6 +21,7 @@ import time
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,11 +97,17 @@ def end_if_orphaned() -> None:
 
     Nobody would have its results, and whoever runs the same again should not have to race with it.
     """
-    pool = multiprocessing.parent_process()
-    if pool is not None and pool.pid != os.getppid():
+    first = _first_parent(os.getpid())
+    if multiprocessing.parent_process() is not None and first != os.getppid():
         if _held.server is not None:
             _held.server.stop()
         os._exit(1)
+
+
+@cache
+def _first_parent(_process: int) -> int:
+    """The parent of this process when it was first asked for."""
+    return os.getppid()
 
 
 def _called_here(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Outcome:
@@ -124,12 +131,13 @@ class _Server:
             start_new_session=True,  # Ctrl-C is for us; the server ends when its input does
             env={**one_thread, **os.environ},
         )
-        self.stop = weakref.finalize(self, _stop, self._process)
+        self._owner = os.getpid()
+        self.stop = weakref.finalize(self, _stop, self._process, self._owner)
 
     @property
     def alive(self) -> bool:
         """Whether it can be asked."""
-        return self._process.poll() is None
+        return self._owner == os.getpid() and self._process.poll() is None
 
     def ask(self, request: bytes, patience: float) -> bytes | None:
         """The answer; None if the server is gone, or as good as gone after `patience` seconds."""
@@ -154,7 +162,9 @@ class _Server:
         return True
 
 
-def _stop(process: subprocess.Popen[bytes]) -> None:
+def _stop(process: subprocess.Popen[bytes], owner: int) -> None:
+    if owner != os.getpid():  # inherited in a fork
+        return
     with contextlib.suppress(OSError):
         os.killpg(process.pid, signal.SIGKILL)  # what it forked dies with it
     for pipe in (process.stdin, process.stdout):

@@ -96,6 +96,7 @@ def measured(asset: Asset) -> Asset:
         category=before.category,
         up=before.up,
         label=before.label,
+        label_quality=before.label_quality,
         mass_properties=before.mass_properties,
         parts=before.parts,
         areas=before.areas,
@@ -124,9 +125,7 @@ def _write_model(path: Path, asset: Asset) -> None:
         inertial = cast(ElementTree.Element, root.find(".//inertial"))
         i = properties.inertia
         inertial.set("mass", numbers([properties.mass]))
-        inertial.set(
-            "fullinertia", numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]])
-        )
+        inertial.set("fullinertia", numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]))
     for part in asset.parts:
         joint = cast(ElementTree.Element, root.find(f".//joint[@name='{part.name}']"))
         joint.set("pos", numbers(part.joint.origin))

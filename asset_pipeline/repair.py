@@ -55,9 +55,8 @@ def turn_outwards(mesh: trimesh.Trimesh) -> int:
         return 0
     if not surface.is_winding_consistent:
         trimesh.repair.fix_winding(surface)
-    surface.vertices -= (
-        surface.centroid
-    )  # where it is open, the volume is that of cones from the origin
+    # Where it is open, the volume is that of cones from the origin.
+    surface.vertices -= surface.bounds.mean(axis=0)
     if float(surface.volume) < 0:
         surface.invert()
     turned = (np.asarray(surface.faces) != before).any(axis=1)

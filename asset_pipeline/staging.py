@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import glob
 import os
 import shutil
 import tempfile
@@ -18,16 +17,13 @@ LOCK = "lock"
 
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
-    """A new folder beside `folder`, removed in the end; also those that killed processes left there.
+    """A new folder beside `folder`, removed in the end; if the process is killed, by `clear_staging`.
 
     Raises:
       OSError: It cannot be made.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
-    prefix = f"{PREFIX}{folder.name}-"
-    for left in folder.parent.glob(f"{glob.escape(prefix)}*"):
-        _remove_if_left(left)
-    path = Path(tempfile.mkdtemp(prefix=prefix, dir=folder.parent))
+    path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{folder.name}-", dir=folder.parent))
     try:
         # The lock goes with the process, however it ends.
         with (path / LOCK).open("wb") as lock:
@@ -35,6 +31,14 @@ def staging(folder: Path) -> Iterator[Path]:
             yield path
     finally:
         shutil.rmtree(path, ignore_errors=True)
+
+
+def clear_staging(parent: Path) -> None:
+    """Remove what `staging` made in `parent` for processes that were killed since."""
+    for path in parent.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError), (path / LOCK).open("r+b") as lock:
+            if _locked(lock):
+                shutil.rmtree(path, ignore_errors=True)
 
 
 def put_in_place(built: Path, folder: Path) -> None:
@@ -54,12 +58,6 @@ def put_in_place(built: Path, folder: Path) -> None:
             with contextlib.suppress(FileNotFoundError):
                 os.rename(folder, retired / "old")
             shutil.rmtree(retired, ignore_errors=True)
-
-
-def _remove_if_left(path: Path) -> None:
-    with contextlib.suppress(OSError), (path / LOCK).open("ab") as lock:
-        if _locked(lock):
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def _locked(file: IO[bytes]) -> bool:

@@ -25,18 +25,17 @@ def visible_shapes(folder: Path) -> dict[str, tuple[Shape, ...]]:
     path = folder / MODEL_FILE
     try:
         root = ElementTree.parse(path).getroot()
-        files = {
-            each.attrib["name"]: folder / each.attrib["file"]
-            for kind in ("mesh", "texture")
-            for each in root.findall(f"asset/{kind}")
-        }
+        meshes, images = (
+            {each.attrib["name"]: folder / each.attrib["file"] for each in root.findall(kind)}
+            for kind in ("asset/mesh", "asset/texture")
+        )
         materials = {
-            each.attrib["name"]: files[each.attrib["texture"]]
+            each.attrib["name"]: images[each.attrib["texture"]]
             for each in root.findall("asset/material")
         }
         return {
             body.attrib["name"]: tuple(
-                _shape(geom, files, materials)
+                _shape(geom, meshes, materials)
                 for geom in body.findall("geom")
                 if geom.get("group") == VISUAL_GROUP
             )
@@ -53,15 +52,13 @@ def surface(shapes: dict[str, tuple[Shape, ...]]) -> trimesh.Trimesh:
     return cast(trimesh.Trimesh, trimesh.util.concatenate(bare))
 
 
-def _shape(
-    geom: ElementTree.Element, files: dict[str, Path], materials: dict[str, Path]
-) -> Shape:
+def _shape(geom: ElementTree.Element, meshes: dict[str, Path], materials: dict[str, Path]) -> Shape:
     kind, numbers = geom.attrib["type"], geom.get("rgba", "0.7 0.7 0.7 1").split()
     r, g, b, a = map(float, numbers)
     material = geom.get("material")
     texture = None if material is None else materials[material]
     if kind == "mesh":
-        file = files[geom.attrib["mesh"]]
+        file = meshes[geom.attrib["mesh"]]
         mesh = trimesh.load(file, force="mesh", process=False, skip_materials=True)
         return Shape("mesh", mesh=cast(trimesh.Trimesh, mesh), rgba=(r, g, b, a), texture=texture)
     vector = [*geom.attrib["pos"].split(), *geom.attrib["quat"].split()]

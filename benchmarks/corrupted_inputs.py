@@ -8,7 +8,7 @@ NaN, zero area, inverted faces, gigantic coordinates, other units, wrong indices
 archive members that leave their folder; cyclic URDFs and expanding entities. Every one has to be rejected
 with the file and the reason in one line, or repaired with a warning; what is built without either was
 sound after all (a cut-off newline, a texture nobody reads) or cannot be told from an undamaged object.
-Exits with 1 if a build hangs past its limit, an error is not one line that names the file, or
+"Stopped" is rejected at the time limit. Exits with 1 if a build hangs past its limit, an error is not one line that names the file, or
 anything is written outside `--out`: the data, the working directory, the home, the temporary folder.
 """
 
@@ -66,7 +66,7 @@ def main() -> None:
         outcome, fault = attempt(case, limits)
         slowest = max(slowest, time.monotonic() - start)
         if time.monotonic() - start > 2 * limits.seconds + LEEWAY:
-            outcome = "hung"
+            outcome, fault = "hung", fault or "went on past its limit"
         counts[case.damage, outcome] += 1
         if fault:
             faults.append(f"{case.source}, {case.damage}: {fault}")
@@ -118,7 +118,7 @@ def attempt(case: Case, limits: Limits) -> tuple[str, str]:
         for message in messages:
             if "\n" in message or str(root) not in message:
                 return outcome, f"not one line that names the file: {message!r}"
-        return outcome, messages[0] if outcome in ("stopped", "crashed") else ""
+        return outcome, messages[0] if outcome == "crashed" else ""
 
 
 def tree(home: Path) -> dict[str, tuple[int, int]]:

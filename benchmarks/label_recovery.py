@@ -19,13 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from joblib import Parallel, delayed
 from jaxtyping import Float
+from joblib import Parallel, delayed
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from asset_pipeline.catalogue import CATALOGUE
-from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.labelling.scan_label import scan_label
 from manipose_mj.poses import SymmetryGroup, compose, pose_error, rotation_about, transform
 
@@ -192,7 +191,7 @@ def share(flags) -> float:
 
 def main() -> int:
     """Run, print the table, compare with the bars."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--per-category", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)

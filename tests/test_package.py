@@ -81,7 +81,12 @@ def test_the_asset_pipeline_knows_only_poses_and_errors_of_the_package():
 
 def test_robots_and_scenes_read_built_assets_only():
     """`mjcf` takes the folder's reader and the label from the pipeline, none of what builds."""
-    allowed = ("asset_pipeline.assets", "asset_pipeline.labelling.label", "asset_pipeline.geometry")
+    allowed = (
+        "asset_pipeline.assets",
+        "asset_pipeline.geometry",
+        "asset_pipeline.labelling.label",
+        "asset_pipeline.labelling.label_marks",
+    )
     wrong = [
         f"{file.relative_to(ROOT)} imports {name}"
         for file in _modules("manipose_mj/mjcf")

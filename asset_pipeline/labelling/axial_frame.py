@@ -7,9 +7,10 @@ from jaxtyping import Float
 
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.labelling.label_quality import LabelQuality, fits
+from asset_pipeline.labelling.print_symmetry import print_differs
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.surface_symmetry import (
-    LENIENT,
+    ROUND,
     axial_residual,
     measured_symmetry,
     residual,
@@ -21,7 +22,11 @@ MAX_LEAN = np.deg2rad(13.0)  # of a source's up from the axis
 
 
 def axial_label(
-    cloud: SurfaceCloud, up: Float[np.ndarray, "3"], *, textured: bool
+    cloud: SurfaceCloud,
+    up: Float[np.ndarray, "3"],
+    *,
+    textured: bool,
+    colours: Float[np.ndarray, "n 3"] | None = None,
 ) -> tuple[PoseLabel, LabelQuality] | None:
     """The frame of a surface of revolution, or None where it is not one.
 
@@ -32,7 +37,8 @@ def axial_label(
     Args:
       cloud: The surface.
       up: `(3,)`, unit, in the mesh frame.
-      textured: Whether a print tells the ends apart; there are no flips then.
+      textured: Whether it has a print, which is taken to tell the ends apart: no flips then.
+      colours: Of the cloud's points, to measure whether it does.
     """
     axis, point = half_turn_axis(cloud, up, cloud.points.mean(axis=0))
     axis = axis if axis @ up > 0 else -axis
@@ -42,15 +48,19 @@ def axial_label(
     local = (cloud.points - point) @ rotation
     low, high = local.min(axis=0), local.max(axis=0)
     origin = point + (low[0] + high[0]) / 2 * axis
-    around = axial_residual(cloud, axis, origin)
-    if around > LENIENT.limit(cloud):
+    around = axial_residual(cloud, axis, origin, ROUND.percentile)
+    limit = ROUND.limit(cloud)
+    if around > limit:
         return None
-    symmetry = measured_symmetry(cloud, rotation, origin, axial=LENIENT)
-    if textured:
+    symmetry = measured_symmetry(cloud, rotation, origin, axial=ROUND)
+    turned = rotation @ np.diag([-1.0, 1.0, -1.0]) @ rotation.T
+    flip = residual(cloud, turned, origin)
+    printed = textured and (colours is None or print_differs(cloud, colours, turned, origin))
+    if printed:
         symmetry = SymmetryGroup.about_x()
-    flip = residual(cloud, rotation @ np.diag([-1.0, 1.0, -1.0]) @ rotation.T, origin)
     label = PoseLabel(origin, rotation, "axial", high - low, symmetry)
-    quality = LabelQuality(fits(around, LENIENT.limit(cloud)), {"axis": around, "flip": flip})
+    residuals = {"axis": axial_residual(cloud, axis, origin), "flip": flip}
+    quality = LabelQuality(fits(around, limit), residuals)
     return label, quality
 
 

@@ -19,6 +19,7 @@ RED, GREEN, BLUE = (0.90, 0.10, 0.10), (0.10, 0.70, 0.15), (0.12, 0.25, 0.95)
 CYAN, YELLOW, MAGENTA = (0.0, 0.80, 0.90), (0.95, 0.75, 0.10), (0.85, 0.15, 0.75)
 # An axis reaches beyond the box by this share of its longest side.
 BEYOND = 0.12
+TOOL_AXES = 0.3
 PLANE_MARGIN = 1.15
 
 
@@ -54,10 +55,12 @@ def label_lines(asset: Asset) -> tuple[Line, ...]:
 
 
 def axes(label: PoseLabel, body: str | None = None) -> tuple[Line, ...]:
-    """X, Y and Z from the label's origin to outside the bounding box."""
+    """X, Y and Z from the label's origin to outside the bounding box, if that is in its middle."""
     beyond = BEYOND * float(label.extents.max())
     lengths = np.maximum(label.extents / 2, beyond) + beyond
-    if label.object_type == "handle":
+    if label.object_type == "functional":
+        lengths = np.full(3, TOOL_AXES * float(label.extents.max()))  # the origin is near one end
+    elif label.object_type == "handle":
         lengths = np.maximum(lengths, 0.5 * lengths.max())  # a bar is thin
     ends = transform(label.pose, np.diag(lengths))
     return tuple(
@@ -67,10 +70,16 @@ def axes(label: PoseLabel, body: str | None = None) -> tuple[Line, ...]:
 
 
 def part_lines(part: MovingPart, size: float) -> tuple[Line, ...]:
-    """Axes of the handle, and the joint's axis as long as a fifth of an object of this size."""
-    reach = 0.2 * size * part.joint.axis
-    joint = Line(part.joint.origin - reach, part.joint.origin + reach, CYAN)
-    return (joint, *(() if part.handle is None else axes(part.handle, part.name)))
+    """Axes of the handle, and the joint's for two fifths of the length of an object of this size.
+
+    A slide has a direction and no place of its own: its axis is drawn through the handle.
+    """
+    joint, handle = part.joint, part.handle
+    slides = joint.kind == "slide"
+    middle = joint.origin if handle is None or not slides else handle.origin
+    reach = 0.2 * size * joint.axis
+    line = Line(middle - reach, middle + reach, CYAN, part.name if slides else None)
+    return (line, *(() if handle is None else axes(handle, part.name)))
 
 
 def symmetry_planes(label: PoseLabel) -> tuple[Box, ...]:

@@ -10,6 +10,8 @@ from asset_pipeline.labelling.label_quality import LabelQuality, clear, fits
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.surface_symmetry import (
     STRICT,
+    WORN,
+    Tolerance,
     holds,
     measured_symmetry,
     mirror,
@@ -20,6 +22,7 @@ from asset_pipeline.labelling.upright import MAX_LEAN, upright
 
 STARTS = 12  # normals around up from which planes are sought
 REFINED = 4  # of which as many are fitted finely
+CLEAN = 0.0005  # what a whole thing's plane leaves beside twice the noise, at most [m]
 SQUARE = np.deg2rad(3.0)  # two planes are square to each other to within
 CLEAR_REACH = 0.03  # the side that breaks the symmetry reaches farther by this share of the length
 
@@ -39,14 +42,17 @@ def mirror_label(
     - No plane within the tolerance: as with one, the best there is; the residual and the confidence
       tell.
 
+    The tolerance is strict, unless even the best plane leaves more than a whole thing's: real boxes
+    bulge and lean, and are boxes to within `WORN`.
+
     Args:
       cloud: The surface.
       up: `(3,)`, unit, in the mesh frame.
       object_type: What the label says; an axial object that is not of revolution stays axial.
     """
-    first, second = _planes(cloud, up)
+    first, second, tolerance = _planes(cloud, up)
     residuals = {"plane": residual(cloud, mirror(first[0]), first[0] * first[1])}
-    limit = STRICT.limit(cloud)
+    limit = tolerance.limit(cloud)
     evidence = [fits(residuals["plane"], limit)]
     if second is not None:
         residuals["second_plane"] = residual(cloud, mirror(second[0]), second[0] * second[1])
@@ -70,28 +76,37 @@ def mirror_label(
     local = cloud.points @ rotation
     low, high = local.min(axis=0), local.max(axis=0)
     origin = rotation @ ((low + high) / 2)
-    symmetry = measured_symmetry(cloud, rotation, origin)
+    symmetry = measured_symmetry(cloud, rotation, origin, turns=tolerance)
     half_turn = rotation @ np.diag([1.0, -1.0, -1.0]) @ rotation.T
     residuals["half_turn"] = residual(cloud, half_turn, origin)
     label = PoseLabel(origin, rotation, object_type, high - low, symmetry)
     return label, LabelQuality(min(evidence), residuals)
 
 
-def _planes(cloud: SurfaceCloud, up: np.ndarray) -> tuple[Plane, Plane | None]:
-    """The best upright plane, and a second one square to it where both hold."""
+def _planes(cloud: SurfaceCloud, up: np.ndarray) -> tuple[Plane, Plane | None, Tolerance]:
+    """The best upright plane, a second one square to it where both hold, and by which tolerance.
+
+    Of a square's four planes, those along its sides: with the least rectangle around the shape.
+    """
     found = [refined_plane(cloud, *p) for p in mirror_planes(cloud, around(up, STARTS))[:REFINED]]
     found = [p for p in found if abs(p[0] @ up) < np.sin(MAX_LEAN)] or found
     found.sort(key=lambda p: residual(cloud, mirror(p[0]), p[0] * p[1]))
     first = found[0]
-    held = [p for p in found if holds(cloud, mirror(p[0]), p[0] * p[1], STRICT)]
+    whole = residual(cloud, mirror(first[0]), first[0] * first[1]) < CLEAN + 2 * cloud.noise
+    tolerance = STRICT if whole else WORN
+    held = [p for p in found if holds(cloud, mirror(p[0]), p[0] * p[1], tolerance)]
+    pairs: list[tuple[float, Plane, Plane]] = []
     for a in held:
         across = np.cross(up, a[0])
         across = across / np.linalg.norm(across)
         b = refined_plane(cloud, across, float(across @ cloud.points.mean(axis=0)))
         square = abs(a[0] @ b[0]) < np.sin(SQUARE) and abs(b[0] @ up) < np.sin(MAX_LEAN)
-        if square and holds(cloud, mirror(b[0]), b[0] * b[1], STRICT):
-            return a, b
-    return first, None
+        if square and holds(cloud, mirror(b[0]), b[0] * b[1], tolerance):
+            sides = np.ptp(cloud.points @ np.stack([a[0], b[0]], axis=1), axis=0)
+            pairs.append((float(sides.prod()), a, b))
+    if pairs:
+        return *min(pairs, key=lambda pair: pair[0])[1:], tolerance
+    return first, None, tolerance
 
 
 def positive(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from asset_pipeline.assets import Area, Asset, MovingPart
 from asset_pipeline.geometry import MassProperties
 from asset_pipeline.labelling.label import PoseLabel
+from asset_pipeline.labelling.label_quality import LabelQuality
 from asset_pipeline.labelling.overrides import FrameOverride, Override, PartOverride
 from asset_pipeline.labelling.scan_label import scan_label
 from manipose_mj.errors import InputError, unknown_name
@@ -48,7 +49,10 @@ def overridden(
             )
     category = override.category or asset.category
     up = asset.up if override.up is None else override.up
-    label = moved(_measured(asset, override, surface, category, up, textured), override.frame)
+    found, quality = _measured(asset, override, surface, category, up, textured)
+    label = moved(found, override.frame)
+    if label is not found:
+        quality = None  # a person's word
     if label is not asset.label:
         label = replace(label, extents=np.ptp(surface.vertices @ label.rotation, axis=0))
     return replace(
@@ -56,6 +60,7 @@ def overridden(
         category=category,
         up=up,
         label=label,
+        label_quality=quality,
         mass_properties=_weighed(asset.mass_properties, override.mass),
         parts=tuple(_part(override, part) for part in asset.parts),
         areas=tuple(_area(area, asset.label, label) for area in asset.areas),
@@ -95,19 +100,21 @@ def _measured(
     category: str,
     up: Float[np.ndarray, "3"],
     textured: bool,
-) -> PoseLabel:
+) -> tuple[PoseLabel, LabelQuality | None]:
     """The asset's label, or a new one where what it was measured from is another."""
     if asset.kind == "articulated":
-        return asset.label
+        return asset.label, asset.label_quality
     object_type = override.object_type or asset.label.object_type
     told = (override.object_type, override.up, override.functional)
     another = any(v is not None for v in told)
     if object_type == "functional":
         another = another or category != asset.category
-    if not another or override.frame.whole:
-        return replace(asset.label, object_type=object_type) if another else asset.label
+    if not another:
+        return asset.label, asset.label_quality
+    if override.frame.whole:
+        return replace(asset.label, object_type=object_type), None
     try:
-        label, _ = scan_label(
+        return scan_label(
             surface,
             object_type,
             up,
@@ -117,7 +124,6 @@ def _measured(
         )
     except InputError as error:
         raise InputError(f"{override.where}: cannot be measured as told ({error})") from None
-    return label
 
 
 def _part(override: Override, part: MovingPart) -> MovingPart:

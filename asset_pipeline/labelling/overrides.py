@@ -123,7 +123,7 @@ def read_overrides(path: Path) -> dict[str, Override]:
       InputError: The file is missing or not YAML, or an entry is wrong; one line names file, object,
         field and what would be right.
     """
-    return {name: _override(f"{path}: {name}", e) for name, e in read_entries(path).items()}
+    return {name: parsed(path, name, entry) for name, entry in read_entries(path).items()}
 
 
 def read_entries(path: Path) -> dict[str, dict[str, Any]]:
@@ -162,7 +162,13 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
     return document
 
 
-def _override(where: str, entry: dict[str, Any]) -> Override:
+def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
+    """One entry of a labels file, checked.
+
+    Raises:
+      InputError: A field is unknown or has a wrong value.
+    """
+    where = f"{path}: {name}"
     _require_known(where, "field", entry, ENTRY_KEYS)
     kind = entry.get("object_type")
     if kind is not None and kind not in SCAN_TYPES:
@@ -191,7 +197,9 @@ def _override(where: str, entry: dict[str, Any]) -> Override:
             for name, part in parts.items()
         },
         where=where,
-        digest=hashlib.sha256(json.dumps(entry, sort_keys=True, default=str).encode()).hexdigest()[:12],
+        digest=hashlib.sha256(json.dumps(entry, sort_keys=True, default=str).encode()).hexdigest()[
+            :12
+        ],
     )
 
 
@@ -210,9 +218,7 @@ def _part(where: str, entry: dict[str, Any]) -> PartOverride:
     return PartOverride(handle, origin, _direction(f"{where}: joint", "axis", joint))
 
 
-def _frame(
-    where: str, entry: dict[str, Any], keys: tuple[str, ...] = FRAME_KEYS
-) -> FrameOverride:
+def _frame(where: str, entry: dict[str, Any], keys: tuple[str, ...] = FRAME_KEYS) -> FrameOverride:
     _require_known(where, "field", entry, keys)
     extents = _numbers(where, "extents", entry["extents"], 3) if "extents" in entry else None
     if extents is not None and (extents <= 0).any():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import trimesh
 from jaxtyping import Float
@@ -10,6 +12,7 @@ from asset_pipeline.labelling.axial_frame import axial_label
 from asset_pipeline.labelling.label import ObjectType, PoseLabel
 from asset_pipeline.labelling.label_quality import LabelQuality
 from asset_pipeline.labelling.mirror_frame import mirror_label
+from asset_pipeline.labelling.print_symmetry import surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.tool_frame import tool_label
 from manipose_mj.errors import InputError
@@ -23,6 +26,7 @@ def scan_label(
     category: str = "",
     functional: Float[np.ndarray, "3"] | None = None,
     textured: bool = True,
+    texture: Path | None = None,
 ) -> tuple[PoseLabel, LabelQuality]:
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
@@ -37,7 +41,9 @@ def scan_label(
       category: What kind of thing it is; tells which end of a tool is held. Unknown ones get the
         rule of `tool_frame`.
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
-      textured: Whether the asset has a texture that tells the ends of an axial object apart.
+      textured: Whether the asset has a texture, which is taken to tell the ends of an axial object
+        apart.
+      texture: Its image, to measure whether it does.
 
     Raises:
       InputError: Another object type, which scans do not have, or no `up` where it is needed.
@@ -53,7 +59,8 @@ def scan_label(
         raise InputError(f"no up axis for an object of type {object_type!r}; only tools need none")
     up = np.asarray(up, float) / np.linalg.norm(up)
     if object_type == "axial":
-        found = axial_label(cloud, up, textured=textured)
+        colours = None if texture is None else surface_colours(cloud, mesh, texture)
+        found = axial_label(cloud, up, textured=textured, colours=colours)
         if found is not None:
             return found
     return mirror_label(cloud, up, object_type=object_type)

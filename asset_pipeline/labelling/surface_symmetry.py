@@ -36,8 +36,10 @@ class Tolerance:
 # Vertex noise of 0.5 mm leaves less than 1.3 mm at the 98th percentile; a feature of 3 mm on one
 # fiftieth of the surface leaves more than 2.
 STRICT = Tolerance(percentile=98.0, length=0.0016, share=0.007)
-# For what is said to be axial: fruit, dents and seams do not make an apple a box.
-LENIENT = Tolerance(percentile=95.0, length=0.0016, share=0.025)
+# For what is said to be axial: an apple is none the less, nor a cup whose inside was scanned in patches.
+ROUND = Tolerance(percentile=85.0, length=0.0016, share=0.025)
+# For things that are worn, bulged or badly scanned.
+WORN = Tolerance(percentile=95.0, length=0.0016, share=0.025)
 
 
 def residuals(
@@ -103,6 +105,7 @@ def measured_symmetry(
     origin: Float[np.ndarray, "3"],
     *,
     axial: Tolerance = STRICT,
+    turns: Tolerance = STRICT,
 ) -> SymmetryGroup:
     """The proper rotations, among those a label can have, that map the shape onto itself.
 
@@ -113,17 +116,18 @@ def measured_symmetry(
       cloud: The surface.
       rotation: Columns are the label's axes in the mesh frame.
       origin: `(3,)` [m], the label's origin in the mesh frame.
-      axial: Tolerance of the turns about X; that of all others is strict.
+      axial: Tolerance of every turn about X.
+      turns: Tolerance of the flip, the half and the quarter turns.
     """
 
     def held(turn: np.ndarray) -> bool:
-        return holds(cloud, rotation @ turn @ rotation.T, origin, STRICT)
+        return holds(cloud, rotation @ turn @ rotation.T, origin, turns)
 
     x, y, z = np.eye(3)
     if axial_residual(cloud, rotation[:, 0], origin, axial.percentile) <= axial.limit(cloud):
         return SymmetryGroup.about_x(ends_alike=held(np.diag([-1.0, 1.0, -1.0])))
-    turns = [rotation_about(axis, angle) for angle in (np.pi / 2, np.pi) for axis in (x, y, z)]
-    members = [np.round(turn) for turn in turns if held(turn)]
+    tried = [rotation_about(axis, angle) for angle in (np.pi / 2, np.pi) for axis in (x, y, z)]
+    members = [np.round(turn) for turn in tried if held(turn)]
     return SymmetryGroup.generated(np.stack(members)) if members else SymmetryGroup.identity()
 
 

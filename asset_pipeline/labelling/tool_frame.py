@@ -101,7 +101,11 @@ def tool_label(
         symmetry = turns_about_x(cloud, rotation, origin)
     extents = np.ptp(cloud.points @ rotation, axis=0)
     label = PoseLabel(origin, rotation, "functional", extents, symmetry)
-    evidence = [fits(plane, STRICT.limit(cloud)), clear(ratio, CLEAR_RATIO), clear(change, hint.step)]
+    evidence = [
+        fits(plane, STRICT.limit(cloud)),
+        clear(ratio, CLEAR_RATIO),
+        clear(change, hint.step),
+    ]
     return label, LabelQuality(min(evidence), residuals)
 
 

@@ -37,6 +37,7 @@ UNKNOWN = ToolHint()
 HINTS: dict[str, ToolHint] = {
     "brush": ToolHint("wide", joint="largest"),
     "cutter": ToolHint("thin", step=0.15),
+    "drill": ToolHint("thin", joint="largest", straight="functional"),
     "dustpan": ToolHint("wide", joint="largest", begun=0.75),
     "fork": ToolHint("wide"),
     "hammer": ToolHint("wide", joint="largest"),

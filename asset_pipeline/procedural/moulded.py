@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.procedural.extruded import MAX_CORNERS
 from asset_pipeline.procedural.handles import loop_hulls
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.solids import loft, print_on_face
@@ -112,7 +113,21 @@ def moulded(
     """
     mesh = loft(loops)
     mass = solid_mass_properties(mesh, density * float(mesh.volume))
-    return Piece((*banded_loft(loops, bands), *prints), loop_hulls(loops), mass)
+    parts = loop_hulls(loops[:, outstanding(loops[len(loops) // 2], MAX_CORNERS)])
+    return Piece((*banded_loft(loops, bands), *prints), parts, mass)
+
+
+def outstanding(outline: Float[np.ndarray, "p 3"], count: int) -> list[int]:
+    """Which corners of a convex outline to keep, `count` at most: those that cut least off are left out."""
+    kept = list(range(len(outline)))
+    while len(kept) > count:
+        corners = outline[kept]
+        behind, ahead = (
+            corners - np.roll(corners, 1, axis=0),
+            np.roll(corners, -1, axis=0) - corners,
+        )
+        kept.pop(int(np.argmin(np.linalg.norm(np.cross(behind, ahead), axis=1))))
+    return kept
 
 
 def banded_loft(

@@ -63,7 +63,9 @@ def build_assets(
             if path is not None:
                 raise InputError(f"the catalogue is built in and reads no files; leave out {path}")
             if labels is not None:
-                raise InputError(f"the catalogue's labels are exact by construction; leave out {labels}")
+                raise InputError(
+                    f"the catalogue's labels are exact by construction; leave out {labels}"
+                )
             results = build_catalogue(out, jobs=jobs, only=only, progress=show)
         else:
             if source not in SOURCES:

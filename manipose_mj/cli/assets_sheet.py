@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def draw_sheets(
-    directory: Annotated[Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")] = None,
+    directory: Annotated[
+        Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")
+    ] = None,
     /,
     *,
     out: Annotated[Path, arg(metavar="FOLDER")],

@@ -43,6 +43,8 @@ def show_asset(
 
 
 def _rows(asset: Asset) -> list[tuple[str, str]]:
+    from asset_pipeline.labelling.symmetry_names import symmetry_name
+
     label, mass, grasps = asset.label, asset.mass_properties, asset.grasps
     rows = [
         ("kind, category", f"{asset.kind}, {asset.category}"),
@@ -50,7 +52,7 @@ def _rows(asset: Asset) -> list[tuple[str, str]]:
         ("label origin [mm]", _vector(1000 * label.origin)),
         *((f"label {axis}", _vector(label.rotation[:, i], 3)) for i, axis in enumerate("XYZ")),
         ("extents along them [mm]", _vector(1000 * label.extents)),
-        ("symmetry", _symmetry(asset)),
+        ("symmetry", symmetry_name(label.symmetry)),
         ("mass [kg]", f"{mass.mass:.3f}"),
         ("centre of mass [mm]", _vector(1000 * mass.center_of_mass)),
         ("inertia, diagonal [kg m^2]", _vector(mass.inertia.diagonal(), 7)),
@@ -78,14 +80,6 @@ def _part(part: Any) -> str:
     else:
         travel = f"turns {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
     return travel + ("" if part.handle is None else ", has a handle")
-
-
-def _symmetry(asset: Asset) -> str:
-    group = asset.label.symmetry
-    turns = len(group.rotations) - 1
-    found = ["any turn about X"] if group.axial else []
-    found += [f"{turns} more turn{'s' if turns > 1 else ''}"] if turns else []
-    return ", ".join(found) or "none"
 
 
 def _vector(values: Any, digits: int = 1) -> str:

@@ -3,52 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pytest
+from articulated_scene import all_ways, on_table, pull, touching
 
 from asset_pipeline.assets import MovingPart
-from asset_pipeline.emit import model_element
 from asset_pipeline.procedural.articulated.bar_handle import BarHandle
-from asset_pipeline.procedural.articulated.cabinet import DRAWERS, design, generate
+from asset_pipeline.procedural.articulated.cabinet import design, generate
+from asset_pipeline.procedural.articulated.cabinet_kinds import DRAWERS
 from manipose_mj.poses import rotation_about, transform
 
 OPENING_FORCE = 15.0  # [N], what a Panda pulls with ease
 CLOSING_FORCE = 20.0
 CAN = '<geom name="can" type="cylinder" size=".0375 .125" mass=".205" condim="6" friction=".8 .005 .001"/>'
-TABLE = '<geom name="table" type="plane" size="2 2 1"/>'
 each = pytest.mark.parametrize("index", [0, 3])
 
 
 def cabinet_model(index: int, folder: Path, extra: str = "") -> mujoco.MjModel:
     """The cabinet on a table."""
-    root = model_element("cabinet", generate(index).bodies, folder)
-    for element in ElementTree.fromstring(f"<extra>{TABLE}{extra}</extra>"):
-        root.find("worldbody").append(element)
-    ElementTree.SubElement(root, "option", cone="elliptic", impratio="10")
-    ElementTree.ElementTree(root).write(folder / "model.xml")
-    return mujoco.MjModel.from_xml_path(str(folder / "model.xml"))
-
-
-def push(model: mujoco.MjModel, data: mujoco.MjData, part: MovingPart, force: float) -> None:
-    """Pull the part by its handle, along the handle's outward direction, for one step."""
-    body = data.body(part.name)
-    turn = body.xmat.reshape(3, 3)
-    outwards = turn @ part.handle.rotation[:, 1]
-    point = body.xpos + turn @ part.handle.origin
-    data.qfrc_applied[:] = 0
-    mujoco.mj_applyFT(
-        model,
-        data,
-        force * outwards,
-        np.zeros(3),
-        point,
-        model.body(part.name).id,
-        data.qfrc_applied,
-    )
-    mujoco.mj_step(model, data)
+    return on_table(generate(index), folder, extra)
 
 
 def moving_parts(index: int) -> tuple[MovingPart, ...]:
@@ -70,15 +45,7 @@ def test_untouched_it_stays_shut_and_touches_nothing(index, tmp_path):
 @each
 def test_nothing_touches_anywhere_in_the_ranges(index, tmp_path):
     model = cabinet_model(index, tmp_path)
-    data = mujoco.MjData(model)
-    low, high = model.jnt_range.T
-    rng = np.random.default_rng(0)
-    along = np.linspace(0, 1, 12)[:, None] * np.eye(4)[:, None, :]
-    shares = np.concatenate([along.reshape(-1, 4), rng.uniform(size=(40, 4)), np.ones((1, 4))])
-    for share in shares:
-        data.qpos[:] = low + share * (high - low)
-        mujoco.mj_forward(model, data)
-        assert data.ncon == 0, share
+    assert touching(model, all_ways(4)) == []
 
 
 @each
@@ -87,12 +54,12 @@ def test_parts_open_by_their_handles_under_a_bounded_force(index, tmp_path):
     for part in moving_parts(index):
         data = mujoco.MjData(model)
         while data.time < 3.0:
-            push(model, data, part, OPENING_FORCE)
+            pull(model, data, part, OPENING_FORCE)
         assert data.joint(part.name).qpos[0] > 0.9 * part.joint.range[1], part.name
         others = [p.name for p in moving_parts(index) if p.name != part.name]
         assert all(abs(data.joint(name).qpos[0]) < 1e-4 for name in others)
         while data.time < 6.0:
-            push(model, data, part, -OPENING_FORCE)
+            pull(model, data, part, -OPENING_FORCE)
         assert abs(data.joint(part.name).qpos[0]) < 2e-3, part.name
 
 
@@ -102,7 +69,7 @@ def test_a_small_force_does_not_open_it(index, tmp_path):
     for part in moving_parts(index):
         data = mujoco.MjData(model)
         while data.time < 0.5:
-            push(model, data, part, 0.5)
+            pull(model, data, part, 0.5)
         # Without dry friction it would have come out by 25 mm, or 0.1 rad.
         assert data.joint(part.name).qpos[0] < 5e-3, part.name
 
@@ -138,7 +105,7 @@ def test_a_lying_chips_can_rests_in_the_middle_drawer_and_is_shut_away(index, tm
     while data.time < 5.0:
         # As an arm shuts it: no faster than 0.15 m/s.
         shutting = drawer.qpos[0] > 1e-3 and drawer.qvel[0] > -0.15
-        push(model, data, part, -CLOSING_FORCE if shutting else 0.0)
+        pull(model, data, part, -CLOSING_FORCE if shutting else 0.0)
     assert drawer.qpos[0] < 2e-3
     away = np.abs(data.body("can").xpos - cavity.center)
     half = np.array([0.0375, 0.125, 0.0375])

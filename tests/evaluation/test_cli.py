@@ -26,7 +26,10 @@ COMMANDS = (
     "assets build",
     "assets check",
     "assets fetch",
+    "assets label",
     "assets list",
+    "assets relabel",
+    "assets sheet",
     "assets show",
 )
 

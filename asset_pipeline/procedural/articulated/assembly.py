@@ -1,4 +1,4 @@
-"""A base and its moving parts, put together from pieces."""
+"""A base and its moving parts, put together from portions."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from jaxtyping import Float
 from asset_pipeline.assets import Cavity, MovingPart
 from asset_pipeline.geometry import Body, Joint
 from asset_pipeline.labelling.articulated_label import articulated_label
-from asset_pipeline.mass import combine
+from asset_pipeline.mass import shape_mass_properties
 from asset_pipeline.procedural.articulated.mounted import Mounted
-from asset_pipeline.procedural.pieces import Piece
+from asset_pipeline.procedural.articulated.portion import Portion
 from asset_pipeline.procedural.specimen import Specimen
 
 
@@ -26,14 +26,16 @@ class Part:
 
 
 def body_of(
-    name: str, pieces: Sequence[Piece], joint: Joint | None = None, *, balanced: float = 0.0
+    name: str, portions: Sequence[Portion], joint: Joint | None = None, *, balanced: float = 0.0
 ) -> Body:
-    """A rigid body made of pieces; `joint` and `balanced` as in `Body`."""
+    """A rigid body made of portions; `joint` and `balanced` as in `Body`."""
+    collision = [s for portion in portions for s in portion.collision]
+    densities = [d for portion in portions for d in portion.densities]
     return Body(
         name=name,
-        collision=tuple(s for piece in pieces for s in piece.collision),
-        visual=tuple(s for piece in pieces for s in piece.visual),
-        mass_properties=combine([piece.mass for piece in pieces]),
+        collision=tuple(collision),
+        visual=tuple(s for portion in portions for s in portion.visual),
+        mass_properties=shape_mass_properties(collision, densities),
         joint=joint,
         balanced=balanced,
     )
@@ -41,7 +43,7 @@ def body_of(
 
 def moving(
     name: str,
-    pieces: Sequence[Piece],
+    portions: Sequence[Portion],
     handle: Mounted,
     joint: Joint,
     cavity: Cavity,
@@ -49,11 +51,11 @@ def moving(
     balanced: float = 0.0,
 ) -> Part:
     """A drawer or a door: what it is made of, its handle, its joint and the space it opens."""
-    body = body_of(name, [*pieces, handle.piece], joint, balanced=balanced)
+    body = body_of(name, [*portions, handle.portion], joint, balanced=balanced)
     return Part(body, MovingPart(name, joint, handle.label, cavity))
 
 
-def articulated_specimen(base: Sequence[Piece], parts: Sequence[Part]) -> Specimen:
+def articulated_specimen(base: Sequence[Portion], parts: Sequence[Part]) -> Specimen:
     """The whole, everything shut; the front is towards -x."""
     bodies = (body_of("base", base), *(part.body for part in parts))
     return Specimen(articulated_label(bodies), bodies, tuple(part.entry for part in parts))

@@ -8,14 +8,13 @@ import numpy as np
 from jaxtyping import Float
 
 from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import shape_mass_properties
 from asset_pipeline.procedural.articulated.mounted import (
     ALUMINIUM,
     Direction,
     Mounted,
     handle_axes,
 )
-from asset_pipeline.procedural.pieces import Piece
+from asset_pipeline.procedural.articulated.portion import portion
 from asset_pipeline.procedural.solids import box, rounded_box
 from asset_pipeline.procedural.specimen import Colour
 from manipose_mj.poses import SymmetryGroup
@@ -61,4 +60,4 @@ class BarHandle:
             # Half a turn about Y swaps the ends of the bar and the posts.
             symmetry=SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])])),
         )
-        return Mounted(Piece(visual, collision, shape_mass_properties(collision, ALUMINIUM)), label)
+        return Mounted(portion(visual, collision, ALUMINIUM), label)

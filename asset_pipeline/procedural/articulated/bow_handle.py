@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from asset_pipeline.geometry import Shape
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.procedural.articulated.mounted import (
     ALUMINIUM,
@@ -17,7 +18,7 @@ from asset_pipeline.procedural.articulated.mounted import (
     Mounted,
     handle_axes,
 )
-from asset_pipeline.procedural.pieces import placed, solid_piece
+from asset_pipeline.procedural.articulated.portion import moved, portion
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.swept import bar_loops, convex_chunks, loft_outwards
 from manipose_mj.poses import SymmetryGroup, compose
@@ -59,12 +60,8 @@ class BowHandle:
         half = np.tile([self.thickness / 2, self.width / 2], (STATIONS, 1))
         loops = bar_loops(line, half, sideways=(0.0, 0.0, 1.0), power=4.0, points=POINTS)
         loops[[0, -1], :, 1] = 0.0  # the feet stand flat on the face
-        piece = solid_piece(
-            loft_outwards(loops),
-            convex_chunks(loops, PARTS),
-            rgba=self.rgba,
-            density=ALUMINIUM,
-        )
+        arch = Shape("mesh", mesh=loft_outwards(loops), rgba=self.rgba)
+        bow = portion([arch], convex_chunks(loops, PARTS), ALUMINIUM)
         rotation = handle_axes(direction)
         label = PoseLabel(
             origin=np.asarray(foot, float) + rise * rotation[:, 1],
@@ -73,4 +70,4 @@ class BowHandle:
             extents=np.array([self.length, self.thickness, self.width]),
             symmetry=SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])])),
         )
-        return Mounted(placed(piece, compose(rotation, np.asarray(foot, float))), label)
+        return Mounted(moved(bow, compose(rotation, np.asarray(foot, float))), label)

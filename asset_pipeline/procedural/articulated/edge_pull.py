@@ -12,14 +12,13 @@ import numpy as np
 from jaxtyping import Float
 
 from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import shape_mass_properties
 from asset_pipeline.procedural.articulated.mounted import (
     ALUMINIUM,
     Direction,
     Mounted,
     handle_axes,
 )
-from asset_pipeline.procedural.pieces import Piece, placed
+from asset_pipeline.procedural.articulated.portion import moved, portion
 from asset_pipeline.procedural.solids import box, rounded_box
 from asset_pipeline.procedural.specimen import Colour
 from manipose_mj.poses import SymmetryGroup, compose
@@ -56,7 +55,7 @@ class EdgePull:
         )
         collision = tuple(box(*ends, self.rgba) for ends in (lip, web))
         visual = (rounded_box(*lip, 0.35 * self.height, self.rgba), collision[1])
-        piece = Piece(visual, collision, shape_mass_properties(collision, ALUMINIUM))
+        pull = portion(visual, collision, ALUMINIUM)
         rotation = handle_axes(direction)
         label = PoseLabel(
             origin=np.asarray(foot, float) + middle * rotation[:, 1],
@@ -65,4 +64,4 @@ class EdgePull:
             extents=np.array([self.length, self.thickness, self.height]),
             symmetry=SymmetryGroup.identity(),
         )
-        return Mounted(placed(piece, compose(rotation, np.asarray(foot, float))), label)
+        return Mounted(moved(pull, compose(rotation, np.asarray(foot, float))), label)

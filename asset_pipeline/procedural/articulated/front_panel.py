@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 import shapely
@@ -11,8 +12,7 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import shape_mass_properties
-from asset_pipeline.procedural.pieces import Piece
+from asset_pipeline.procedural.articulated.portion import Portion, portion
 from asset_pipeline.procedural.solids import box, rounded_box, rounded_rectangle
 from asset_pipeline.procedural.specimen import Colour
 
@@ -33,11 +33,11 @@ class Pane:
     density: float
 
 
-def slab(low: Point, high: Point, *, rgba: Colour, density: float) -> Piece:
+def slab(low: Point, high: Point, *, rgba: Colour, density: float) -> Portion:
     """A massive board with rounded edges."""
     solid = (box(low, high, rgba),)
     looks = (rounded_box(low, high, EDGE, rgba),)
-    return Piece(looks, solid, shape_mass_properties(solid, density))
+    return portion(looks, solid, density)
 
 
 def framed(
@@ -49,7 +49,7 @@ def framed(
     rgba: Colour,
     density: float,
     corners: tuple[float, float] = (EDGE, 0.0),
-) -> Piece:
+) -> Portion:
     """A frame between two corners, with a pane in its window.
 
     Args:
@@ -78,7 +78,7 @@ def framed(
         Shape("mesh", mesh=ring, rgba=rgba),
         box(window_low - lap, window_high + lap, pane.rgba),
     )
-    return Piece(looks, tuple(solid), shape_mass_properties(solid, [*[density] * 4, pane.density]))
+    return Portion(looks, tuple(solid), (*[density] * 4, pane.density))
 
 
 def ring_boxes(
@@ -122,7 +122,9 @@ def extruded_along_x(outline: shapely.Polygon, x: tuple[float, float]) -> trimes
 
 def merged(meshes: Sequence[trimesh.Trimesh], rgba: Colour) -> Shape:
     """Meshes of one colour as one shape to look at."""
-    return Shape("mesh", mesh=trimesh.util.concatenate(list(meshes)), rgba=rgba)
+    return Shape(
+        "mesh", mesh=cast(trimesh.Trimesh, trimesh.util.concatenate(list(meshes))), rgba=rgba
+    )
 
 
 def _outline(rectangle: Rectangle) -> Float[np.ndarray, "p 2"]:

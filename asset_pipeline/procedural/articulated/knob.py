@@ -12,14 +12,13 @@ from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import solid_mass_properties
 from asset_pipeline.procedural.articulated.mounted import (
     ALUMINIUM,
     Direction,
     Mounted,
     handle_axes,
 )
-from asset_pipeline.procedural.pieces import Piece, placed
+from asset_pipeline.procedural.articulated.portion import moved, portion
 from asset_pipeline.procedural.revolution import convex_part, fillet, lathe
 from asset_pipeline.procedural.specimen import Colour
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
@@ -78,8 +77,7 @@ class Knob:
                 + [(0.72 * radius, self.depth)]
             ),
         )
-        mass = solid_mass_properties(surface, ALUMINIUM * float(surface.volume))
-        piece = Piece((Shape("mesh", mesh=surface, rgba=self.rgba),), parts, mass)
+        knob = portion([Shape("mesh", mesh=surface, rgba=self.rgba)], parts, ALUMINIUM)
         centre = np.asarray(foot, float) + self.depth / 2 * OUTWARDS[:, 2]
         turns = [
             rotation_about(np.array([0.0, 1.0, 0.0]), 2 * np.pi * k / TURNS) for k in range(TURNS)
@@ -91,7 +89,7 @@ class Knob:
             extents=np.array([self.diameter, self.depth, self.diameter]),
             symmetry=SymmetryGroup(np.stack(turns)),
         )
-        return Mounted(placed(piece, compose(OUTWARDS, np.asarray(foot, float))), label)
+        return Mounted(moved(knob, compose(OUTWARDS, np.asarray(foot, float))), label)
 
 
 def _frustums(rings: list[tuple[float, float]]) -> Shape:

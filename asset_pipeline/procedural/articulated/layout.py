@@ -60,7 +60,8 @@ class Lines:
     def between(cls, clear: tuple[float, ...], board: float, start: float) -> Lines:
         """Lines from `start` on, with these clear lengths between the boards."""
         inner = [start + (k + 0.5) * board + sum(clear[:k]) for k in range(1, len(clear))]
-        return cls((start, *inner, start + sum(clear) + (len(clear) + 1) * board), board)
+        last = start + sum(clear) + (len(clear) + 1) * board
+        return cls((start, *inner, last), board)
 
     @property
     def count(self) -> int:

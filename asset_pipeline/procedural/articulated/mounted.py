@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.procedural.pieces import Piece
+from asset_pipeline.procedural.articulated.portion import Portion
 
 Direction = Literal["level", "upright"]
 OUT = np.array([-1.0, 0.0, 0.0])
@@ -22,9 +22,9 @@ ALUMINIUM = 2700.0  # [kg/m^3], what handles are made of
 
 @dataclass(frozen=True)
 class Mounted:
-    """A handle in the object frame. Attributes: piece, shapes and mass; label, of its grip."""
+    """A handle in the object frame. Attributes: portion, its shapes; label, of its grip."""
 
-    piece: Piece
+    portion: Portion
     label: PoseLabel
 
 

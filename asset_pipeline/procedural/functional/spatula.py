@@ -10,7 +10,7 @@ blade; the origin is where the handle ends and the stem begins.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ import shapely
 import shapely.affinity
 from jaxtyping import Float
 
-from asset_pipeline.procedural.extruded import panel
+from asset_pipeline.procedural.extruded import convex_prisms, panel
 from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
@@ -124,7 +124,16 @@ def generate(index: int = 0) -> Specimen:
     pose = compose(turn, np.array([spatula.stem, 0.0, -spatula.drop]))
     density = NYLON if spatula.style == "nylon" else THIN_STEEL
     half = spatula.wall / 2
-    blade = panel(_outline(spatula), -half, half, rgba=spatula.metal, density=density)
+    outline = _outline(spatula)
+    blade = panel(outline, -half, half, rgba=spatula.metal, density=density)
+    # A plane touches one corner of a convex part at a time: on a single part the blade would rock.
+    if spatula.holes == "none":
+        parts = []
+        for y in (-1.0, 0.0):
+            side = shapely.clip_by_rect(outline, -1.0, y, 1.0, y + 1.0)
+            assert isinstance(side, shapely.Polygon)
+            parts += convex_prisms(side, -half, half)
+        blade = replace(blade, collision=tuple(parts))
     return tool_specimen(
         "spatula",
         [_handle(spatula), _stem(spatula, pose), placed(blade, pose)],
@@ -150,7 +159,7 @@ def _handle(spatula: Spatula) -> Piece:
         (0.0, spatula.ring),
     ]
     density = WOOD if spatula.style == "wooden handle" else PLASTIC
-    outline = superellipse(2.4)
+    outline = superellipse(2.0)
     return handle(table, bands, density=density, outline=outline, rounding=(0.5 * deep, 0.001))
 
 

@@ -20,7 +20,6 @@ from asset_pipeline.procedural.handles import ALONG_Y, loop_hulls
 from asset_pipeline.procedural.moulded import facing, printed, rectangle, rounded_polygon
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.shell import painted
-from asset_pipeline.procedural.solids import loft
 from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
 from asset_pipeline.procedural.swept import bar, loft_outwards
 from asset_pipeline.procedural.turned import turned
@@ -100,7 +99,7 @@ def design(index: int) -> Mouse:
         round_off=drawn(rng, 0.24, 0.34),
         square=drawn(rng, 2.4, 3.2),
         split=drawn(rng, 0.42, 0.54),
-        cord=drawn(rng, 0.015, 0.020),
+        cord=drawn(rng, 0.0165, 0.020),
         density=round(float(rng.uniform(520.0, 760.0)), 0),
         **dict(zip(("shell", "buttons", "sides", "wheel"), in_turn(index, _LOOKS), strict=True)),
     )

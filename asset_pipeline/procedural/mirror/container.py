@@ -121,11 +121,14 @@ def _lid(item: Container) -> Piece:
     """The lid, with a rim around a sunken panel, drawn as prints."""
     x, y, top = item.length / 2 - CLIP, item.width / 2 - CLIP, item.height
     radius = item.corner + item.overhang - CLIP
-    loops = slab_loops(
-        rectangle(x, y), radius, top - item.lid, top, edges=(0.0015, 0.003), steps=7
-    )
+    loops = slab_loops(rectangle(x, y), radius, top - item.lid, top, edges=(0.0015, 0.003), steps=7)
     prints = []
-    for inset, rgba, layer in ((0.010, item.latch, 1), (0.0115, item.top, 2), (0.020, item.latch, 3), (0.021, item.top, 4)):
+    for inset, rgba, layer in (
+        (0.010, item.latch, 1),
+        (0.0115, item.top, 2),
+        (0.020, item.latch, 3),
+        (0.021, item.top, 4),
+    ):
         outline = rounded_polygon(rectangle(x, y), radius, inset=inset, steps=6)
         prints.append(printed(outline, facing((0, 0, 1), (0, 0, top), up=(0, 1, 0)), rgba, layer))
     bands = ((0.16, GASKET), (1.0, item.top))

@@ -67,11 +67,31 @@ class DrinkBox:
 _LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     (WHITE, (0.22, 0.48, 0.78, 1.0), (0.14, 0.30, 0.58, 1.0), (0.16, 0.36, 0.66, 1.0)),
     ((0.72, 0.12, 0.20, 1.0), (0.95, 0.80, 0.78, 1.0), (0.94, 0.90, 0.84, 1.0), WHITE),
-    ((0.60, 0.76, 0.30, 1.0), (0.95, 0.96, 0.88, 1.0), (0.26, 0.44, 0.16, 1.0), (0.24, 0.54, 0.24, 1.0)),
+    (
+        (0.60, 0.76, 0.30, 1.0),
+        (0.95, 0.96, 0.88, 1.0),
+        (0.26, 0.44, 0.16, 1.0),
+        (0.24, 0.54, 0.24, 1.0),
+    ),
     (WHITE, (0.78, 0.22, 0.20, 1.0), (0.94, 0.74, 0.20, 1.0), (0.78, 0.18, 0.16, 1.0)),
-    ((0.40, 0.24, 0.14, 1.0), (0.90, 0.80, 0.62, 1.0), (0.80, 0.60, 0.30, 1.0), (0.90, 0.86, 0.78, 1.0)),
-    ((0.48, 0.30, 0.58, 1.0), (0.90, 0.86, 0.95, 1.0), (0.96, 0.80, 0.26, 1.0), (0.94, 0.76, 0.22, 1.0)),
-    ((0.97, 0.80, 0.22, 1.0), (0.97, 0.95, 0.88, 1.0), (0.86, 0.36, 0.10, 1.0), (0.88, 0.40, 0.12, 1.0)),
+    (
+        (0.40, 0.24, 0.14, 1.0),
+        (0.90, 0.80, 0.62, 1.0),
+        (0.80, 0.60, 0.30, 1.0),
+        (0.90, 0.86, 0.78, 1.0),
+    ),
+    (
+        (0.48, 0.30, 0.58, 1.0),
+        (0.90, 0.86, 0.95, 1.0),
+        (0.96, 0.80, 0.26, 1.0),
+        (0.94, 0.76, 0.22, 1.0),
+    ),
+    (
+        (0.97, 0.80, 0.22, 1.0),
+        (0.97, 0.95, 0.88, 1.0),
+        (0.86, 0.36, 0.10, 1.0),
+        (0.88, 0.40, 0.12, 1.0),
+    ),
 )
 _STYLES: tuple[Style, ...] = ("gable", "slanted", "brick")
 
@@ -81,14 +101,18 @@ def design(index: int) -> DrinkBox:
     if index == 0:
         return DrinkBox()
     rng = specimen_rng("drinkbox", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     colours = dict(zip(("carton", "band", "ink", "extra"), in_turn(index, _LOOKS), strict=True))
     if style == "brick":
         length = drawn(rng, 0.046, 0.066)
         volume = float(rng.choice((0.125e-3, 0.2e-3, 0.25e-3)))
         width = round(length * float(rng.uniform(0.62, 0.80)), 4)
         height = round(float(np.clip(volume / (length * width), 0.074, 0.118)), 4)
-        radius, out, reach = drawn(rng, 0.0022, 0.0030), drawn(rng, 0.020, 0.034), drawn(rng, 0.024, 0.030)
+        radius, out, reach = (
+            drawn(rng, 0.0022, 0.0030),
+            drawn(rng, 0.020, 0.034),
+            drawn(rng, 0.024, 0.030),
+        )
         return DrinkBox(style, length, width, height, 0.0, 0.0, radius, out, reach, **colours)
     if style == "gable":
         width = drawn(rng, 0.052, 0.064)
@@ -96,10 +120,12 @@ def design(index: int) -> DrinkBox:
         height = drawn(rng, 0.075, 0.165)
         roof, fin = round(width * float(rng.uniform(0.40, 0.50)), 4), drawn(rng, 0.011, 0.016)
         density = float(rng.uniform(550.0, 950.0)) * min(1.0, 0.11 / height)
-        return DrinkBox(style, length, width, height, roof, fin, density=round(density, 0), **colours)
+        return DrinkBox(
+            style, length, width, height, roof, fin, density=round(density, 0), **colours
+        )
     width = drawn(rng, 0.056, 0.066)
     length = round(width * float(rng.uniform(1.14, 1.26)), 4)
-    height, roof = drawn(rng, 0.145, 0.195), round(length * float(rng.uniform(0.40, 0.50)), 4)
+    height, roof = drawn(rng, 0.145, 0.195), round(length * float(rng.uniform(0.46, 0.56)), 4)
     density = round(float(rng.uniform(400.0, 650.0)), 0)
     radius, cap = drawn(rng, 0.0145, 0.0175), drawn(rng, 0.016, 0.020)
     return DrinkBox(style, length, width, height, roof, 0.0, radius, cap, 0.0, density, **colours)
@@ -139,7 +165,10 @@ def _pictures(item: DrinkBox, low: float, high: float) -> list[Shape]:
     """A round fruit or splash on each side."""
     shapes = []
     middle = (0.26 + high) / 2 * item.height
-    for normal, reach, half in (((1, 0, 0), item.length, item.width), ((0, 1, 0), item.width, item.length)):
+    for normal, reach, half in (
+        ((1, 0, 0), item.length, item.width),
+        ((0, 1, 0), item.width, item.length),
+    ):
         radius = min(0.36 * half, 0.40 * (high - 0.26) * item.height)
         for side in (-1.0, 1.0):
             direction = side * np.array(normal, float)
@@ -159,7 +188,9 @@ def _straw(item: DrinkBox) -> list[Piece]:
         [root + bend * (1 - np.cos(turn)), 0 * turn, z + item.out - bend + bend * np.sin(turn)]
     )
     ahead = np.array([np.sin(turn[-1]), 0.0, np.cos(turn[-1])])
-    line = np.concatenate([[[root, 0, z - 0.004], [root, 0, z]], curve, [curve[-1] + item.reach * ahead]])
+    line = np.concatenate(
+        [[[root, 0, z - 0.004], [root, 0, z]], curve, [curve[-1] + item.reach * ahead]]
+    )
     half = np.full((len(line), 2), item.radius)
     straw = bar(line, half, parts=(1, 2, 4, 7), rgba=item.extra, density=300.0)
     foil = printed(ellipse((0.007, 0.007), 24), facing((0, 0, 1), (root, 0, z), up=(0, 1, 0)), FOIL)
@@ -180,7 +211,9 @@ def _gable(item: DrinkBox) -> list[Piece]:
         corners = np.array([[0.9 * y, -0.26], [0.0, 0.55], [-0.9 * y, -0.26]]) * [1.0, item.roof]
         folds.append(printed(corners, face, item.band))
     mesh = rounded_box(
-        np.array([-0.97 * x, -FIN / 2, top - 0.002]), np.array([0.97 * x, FIN / 2, top + item.fin]), 0.0008
+        np.array([-0.97 * x, -FIN / 2, top - 0.002]),
+        np.array([0.97 * x, FIN / 2, top + item.fin]),
+        0.0008,
     ).surface()
     block = box((-0.97 * x, -FIN / 2, top - 0.002), (0.97 * x, FIN / 2, top + item.fin))
     seam = solid_piece(mesh, (block,), rgba=item.carton, density=700.0)
@@ -193,9 +226,19 @@ def _cap(item: DrinkBox) -> list[Piece]:
     slope = np.array([item.length, 0.0, -item.roof]) / np.hypot(item.length, item.roof)
     normal = np.array([-slope[2], 0.0, slope[0]])
     edge = np.array([item.length / 2, 0.0, item.height - item.roof])
-    face = facing(normal, edge - 1.02 * r * slope, up=(0.0, 1.0, 0.0))
+    face = facing(normal, edge - 0.96 * r * slope, up=(0.0, 1.0, 0.0))
     ribs = [(r - 0.0006 * (k % 2), z) for k, z in enumerate(np.linspace(0.22, 0.80, 9) * h)]
-    profile = np.array([(0, -0.001), (r, -0.001), (r, 0.18 * h), *ribs, (r, 0.88 * h), (0.88 * r, h), (0, h + 1e-6)])
+    profile = np.array(
+        [
+            (0, -0.001),
+            (r, -0.001),
+            (r, 0.18 * h),
+            *ribs,
+            (r, 0.88 * h),
+            (0.88 * r, h),
+            (0, h + 1e-6),
+        ]
+    )
     bands = ((0.20 * h, WHITE), (1.0, item.extra))
     cap = turned(profile, (-0.001, 0.88 * h, h), bands=bands, density=350.0, sections=36)
     return [placed(cap, face)]

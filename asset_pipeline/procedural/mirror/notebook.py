@@ -1,7 +1,7 @@
 """A notebook lying flat: bound with a square back, with a plastic coil, or a diary shut by a snap strap.
 
 Real sizes: A6 is 105 x 148 mm, B6 125 x 176 mm, A5 148 x 210 mm, pocket books 90 x 140 mm; 60-120 leaves make 8-18 mm;
-coils are of 2 mm filament every 5 mm. Paper of 80 g/m^2 has about 800 kg/m^3: 0.08-0.35 kg. Up, X, is across the covers.
+coils are of 2 mm filament every 4.5-6 mm. Paper of 80 g/m^2 has about 800 kg/m^3: 0.08-0.35 kg. Up, X, is across the covers.
 A bound book is a plain slab: Y lies along its longer side and the half turns map the shape onto itself. A coil has much
 surface, so by the rule of the bulge Y points from the coil to the fore edge; it is alike from above and below, so half
 a turn about Y is in the group. A strap reaches past the fore edge, where Y points, and lies on top.
@@ -13,23 +13,28 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import trimesh
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.procedural.handles import ALONG_Y
 from asset_pipeline.procedural.moulded import (
     facing,
     moulded,
     printed,
-    raised,
     rectangle,
     rounded_polygon,
     slab_loops,
 )
-from asset_pipeline.procedural.pieces import UPRIGHT, AreaBox, Piece, rigid_specimen
+from asset_pipeline.procedural.pieces import (
+    UPRIGHT,
+    AreaBox,
+    Piece,
+    placed_shape,
+    rigid_specimen,
+)
 from asset_pipeline.procedural.revolution import wall_wedges
-from asset_pipeline.procedural.pieces import placed_shape
-from asset_pipeline.procedural.handles import ALONG_Y
-from asset_pipeline.procedural.solids import box, ellipse, rounded_box
+from asset_pipeline.procedural.snap_strap import snap_strap
 from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
 from asset_pipeline.procedural.swept import bar_loops, loft_outwards
 from manipose_mj.poses import SymmetryGroup
@@ -38,11 +43,11 @@ PAPER: Colour = (0.95, 0.93, 0.87, 1.0)
 LINES: Colour = (0.78, 0.76, 0.70, 1.0)
 METAL: Colour = (0.75, 0.75, 0.76, 1.0)
 COVER = 0.0014  # thickness [m]
-PITCH = 0.0052  # of the coil [m]
+PITCH = 0.0046  # of the coil [m]
 WIRE = 0.0010  # its filament's radius [m]
 WEDGES = 10
 Style = Literal["bound", "coil", "diary"]
-"""The leaves' group of a coil-bound book: half a turn about Y."""
+# Of what is alike from above and below.
 OVER = SymmetryGroup.generated(np.diag([-1.0, 1.0, -1.0])[None])
 
 
@@ -61,7 +66,7 @@ class Notebook:
     thickness: float = 0.013
     coil: float = 0.0075
     strap: float = 0.0
-    past: float = 0.0055
+    past: float = 0.0032
     density: float = 760.0
     cover: Colour = (0.16, 0.34, 0.56, 1.0)
     band: Colour = (0.10, 0.24, 0.42, 1.0)
@@ -91,12 +96,19 @@ def design(index: int) -> Notebook:
     if index == 0:
         return Notebook()
     rng = specimen_rng("notebook", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     sizes = _FORMATS if style == "bound" else _FORMATS[:3]
-    width, depth = (round(side * float(rng.uniform(0.97, 1.03)), 4) for side in sizes[index % len(sizes)])
-    if style == "coil" and rng.random() < 0.35:
+    width, depth = (
+        round(side * float(rng.uniform(0.97, 1.03)), 4) for side in sizes[index % len(sizes)]
+    )
+    if style == "coil" and rng.random() < 0.35 and depth < 0.16:
         width, depth = depth, width
-    thick = drawn(rng, 0.008, 0.016) if style != "diary" else drawn(rng, 0.012, 0.018)
+    low, high = {
+        "bound": (0.008, 0.016),
+        "diary": (0.012, 0.018),
+        "coil": (0.12 * width, 0.135 * width),
+    }[style]
+    thick = drawn(rng, low, high)
     coil = round(thick / 2 + float(rng.uniform(0.0006, 0.0010)), 4)
     return Notebook(
         style,
@@ -105,7 +117,9 @@ def design(index: int) -> Notebook:
         thick,
         coil=coil,
         strap=drawn(rng, 0.022, 0.034),
-        past=drawn(rng, 0.012, 0.015) if style == "diary" else round(0.72 * coil, 4),
+        past=round(width * float(rng.uniform(0.132, 0.148)), 4)
+        if style == "diary"
+        else round(0.42 * coil, 4),
         density=round(float(rng.uniform(650.0, 800.0)), 0),
         **dict(zip(("cover", "band", "label", "extra"), in_turn(index, _LOOKS), strict=True)),
     )
@@ -146,7 +160,14 @@ def _book(book: Notebook) -> Piece:
     prints: list[Shape] = []
     back = facing((-1, 0, 0), (-x, 0, z / 2))
     if book.style == "coil":
-        prints += [_on(top, rounded_polygon(rectangle(0.55 * x, 0.16 * y), 0.004), book.label, (0.08 * x, 0.40 * y))]
+        prints += [
+            _on(
+                top,
+                rounded_polygon(rectangle(0.55 * x, 0.16 * y), 0.004),
+                book.label,
+                (0.08 * x, 0.40 * y),
+            )
+        ]
         for k in (-1, 0, 1):
             line = rectangle(0.42 * x, 0.0005)
             prints.append(_on(top, line, book.band, (0.08 * x, (0.40 + 0.07 * k) * y), 2))
@@ -164,7 +185,9 @@ def _book(book: Notebook) -> Piece:
     return moulded(loops, bands, density=book.density, prints=prints)
 
 
-def _on(face: np.ndarray, outline: np.ndarray, rgba: Colour, at: tuple[float, float], layer: int = 1) -> Shape:
+def _on(
+    face: np.ndarray, outline: np.ndarray, rgba: Colour, at: tuple[float, float], layer: int = 1
+) -> Shape:
     pose = face.copy()
     pose[:3, 3] += face[:3, :2] @ np.array(at)
     return printed(outline, pose, rgba, layer)
@@ -177,17 +200,17 @@ def _coil(book: Notebook) -> Piece:
     angles = np.linspace(0, 2 * np.pi, 13)
     radius = book.coil - WIRE
     count = int((book.depth - 0.010) / PITCH)
-    looks, line = [], np.stack([radius * np.cos(angles), 0 * angles, radius * np.sin(angles)], 1)
+    line = np.stack([radius * np.cos(angles), 0 * angles, radius * np.sin(angles)], axis=1)
     loops = bar_loops(line, np.full((13, 2), WIRE), points=6)
     loops[-1] = loops[0]
     ring = loft_outwards(loops)
-    for k in range(count):
-        copy = ring.copy()
-        copy.apply_translation(centre + [0.0, (k - (count - 1) / 2) * PITCH, 0.0])
-        looks.append(Shape("mesh", mesh=copy, rgba=book.extra))
-    import trimesh
-
-    mesh = trimesh.util.concatenate([s.mesh for s in looks])
+    shifts = centre + np.outer((np.arange(count) - (count - 1) / 2) * PITCH, [0.0, 1.0, 0.0])
+    size = len(ring.vertices)
+    mesh = trimesh.Trimesh(
+        (np.asarray(ring.vertices) + shifts[:, None]).reshape(-1, 3),
+        (np.asarray(ring.faces) + size * np.arange(count)[:, None, None]).reshape(-1, 3),
+        process=False,
+    )
     half = (count - 1) / 2 * PITCH + WIRE
     outer = np.array([[book.coil, -half], [book.coil, half]])
     inner = outer - [2 * WIRE, 0.0]
@@ -199,19 +222,13 @@ def _coil(book: Notebook) -> Piece:
 
 
 def _strap(book: Notebook) -> Piece:
-    """A strap from below around the fore edge onto the cover, where a snap button holds it."""
-    x, z, y = book.width / 2, book.thickness, book.strap / 2
-    thick, out = 0.0026, x + book.past
-    blocks = [
-        ((0.52 * x, -y, z - 0.0004), (out, y, z + thick)),
-        ((out - thick, -y, 0.0), (out, y, z)),
-        ((x - 0.001, -y, 0.0), (out, y, thick)),
-    ]
-    looks = [rounded_box(np.array(a), np.array(b), 0.0009, book.extra) for a, b in blocks]
-    parts = tuple(box(a, b) for a, b in blocks)
-    face = facing((0, 0, 1), (0.52 * x + y, 0.0, z + thick), up=(0, 1, 0))
-    snap = raised(ellipse((0.0055, 0.0055), 24), face, 0.0022, METAL, shrink=0.8)
-    stud = Shape("cylinder", (0.0052, 0.0010), face)
-    from asset_pipeline.mass import shape_mass_properties
-
-    return Piece((*looks, snap), (*parts, stud), shape_mass_properties(parts, 800.0))
+    x = book.width / 2
+    return snap_strap(
+        start=0.56 * x,
+        edge=x,
+        past=book.past,
+        height=book.thickness,
+        width=book.strap,
+        rgba=book.extra,
+        metal=METAL,
+    )

@@ -84,7 +84,7 @@ def design(index: int) -> Remote:
     if index == 0:
         return Remote()
     rng = specimen_rng("remote", index)
-    style = in_turn(index, _STYLES)
+    style: Style = in_turn(index, _STYLES)
     low, high = {
         "television": (0.170, 0.222),
         "player": (0.145, 0.180),

@@ -9,6 +9,7 @@ square boxes have a round hole and a tissue of four folds, and quarter turns do.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from asset_pipeline.procedural.moulded import (
     moulded,
     printed,
     rectangle,
-    rounded_polygon,
     slab_loops,
 )
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
@@ -78,12 +78,20 @@ def design(index: int) -> TissueBox:
         return TissueBox()
     rng = specimen_rng("tissue", index)
     if index % 4 == 2:
-        length = width = drawn(rng, 0.100, 0.118)
+        length = width = drawn(rng, 0.111, 0.120)
         height = drawn(rng, 0.050, 0.070)
     elif index % 4 == 3:
-        length, width, height = drawn(rng, 0.125, 0.165), drawn(rng, 0.064, 0.072), drawn(rng, 0.052, 0.078)
+        length, width, height = (
+            drawn(rng, 0.125, 0.165),
+            drawn(rng, 0.064, 0.072),
+            drawn(rng, 0.052, 0.078),
+        )
     else:
-        length, width, height = drawn(rng, 0.175, 0.232), drawn(rng, 0.096, 0.120), drawn(rng, 0.045, 0.070)
+        length, width, height = (
+            drawn(rng, 0.175, 0.232),
+            drawn(rng, 0.096, 0.120),
+            drawn(rng, 0.045, 0.070),
+        )
     carton, band, ink = in_turn(index, _LOOKS)
     return TissueBox(
         length,
@@ -159,16 +167,16 @@ def _tissue(item: TissueBox) -> Piece:
         tip = 1 - 0.5 * max(0.0, (t - 0.86) / 0.14) ** 2
         if item.square:
             gathered = 0.30 + 0.42 * t**1.4
-            lobe = 1 - (0.10 + 0.34 * t) * (1 - np.cos(4 * angles)) / 2
+            lobe = 1 - (0.10 + 0.29 * t) * (1 - np.cos(4 * angles)) / 2
             radius = item.slot * item.width * gathered * lobe * (0.72 + 0.28 * tip)
             x, y = radius * c, radius * s
             dip = 0.25 * t**4 * item.out * (1 - np.cos(4 * angles)) / 2
         else:
             long = item.slot * item.length / 2 * (0.66 + (item.spread - 0.66) * t**1.2)
             thick = min(0.020, 0.2 * item.width) * (0.42 + 0.34 * t) * (0.3 + 0.7 * tip)
-            wave = 1 - (0.12 + 0.18 * t) * (1 - np.cos(item.folds * np.pi * c)) / 2
+            wave = 1 - (0.10 + 0.13 * t) * (1 - np.cos(item.folds * np.pi * c)) / 2
             x, y = long * c, thick * s * wave
-            dip = 0.45 * t**4 * item.out * np.abs(c) ** 2
+            dip = 0.36 * t**4 * item.out * np.abs(c) ** 2
         loops.append(np.column_stack([x, y, rise - dip]))
     stack = np.stack(loops)
     mesh = loft(stack)
@@ -181,7 +189,8 @@ def _parts(stack: np.ndarray, square: bool) -> tuple[Shape, ...]:
     parts = []
     sectors = 8 if square else 4
     span = POINTS // sectors
-    for low, high in ((0, 2), (2, 4), (4, 6), (6, 7)):
+    stops = (0, 3, 5, 6, 7) if square else (0, 2, 4, 5, 6, 7)
+    for low, high in pairwise(stops):
         for k in range(sectors):
             columns = (k * span + np.arange(0, span + 1, 2)) % POINTS
             rows = stack[[low, high]][:, columns].reshape(-1, 3)

@@ -1,0 +1,15 @@
+"""`manipose pose`: train and evaluate pose estimators."""
+
+from __future__ import annotations
+
+from tyro.extras import SubcommandApp
+
+from manipose_mj.cli import pose_evaluate, pose_train
+
+
+def build_app() -> SubcommandApp:
+    """The commands under `manipose pose`."""
+    app = SubcommandApp()
+    app.command(name="train")(pose_train.train_pose)
+    app.command(name="evaluate")(pose_evaluate.evaluate_pose)
+    return app

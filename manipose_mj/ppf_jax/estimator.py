@@ -1,0 +1,216 @@
+"""From the cloud of one object to its pose: `PoseEstimator.load("mug").estimate(cloud, key=key)`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+import equinox as eqx
+import jax
+import numpy as np
+from jaxtyping import Float, PRNGKeyArray
+
+from asset_pipeline.catalogue import CATALOGUE
+from asset_pipeline.labelling.label import OBJECT_TYPES
+from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
+from manipose_mj.ppf_jax.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.model import Estimates, PoseModel, estimate_batch, estimate_cloud
+from manipose_mj.ppf_jax.weights import TrainedModel, load_weights
+
+BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
+MIN_POINTS = 32
+_LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
+
+
+class OrientedCloud(Protocol):
+    """What an estimator looks at: points [m] in the camera frame and unit normals."""
+
+    @property
+    def points(self) -> Float[np.ndarray, "n 3"]: ...
+
+    @property
+    def normals(self) -> Float[np.ndarray, "n 3"]: ...
+
+
+AnyCloud: TypeAlias = OrientedCloud | Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True)
+class PoseEstimate:
+    """Where an object is.
+
+    Attributes:
+      pose: `(4, 4)`, `T_camera_label` [m].
+      extents: `(3,)` [m], lengths of the bounding box along the label's axes.
+      confidence: Probability that the pose is within 15 deg and 2 cm.
+      hypotheses: The other candidates, likeliest first; none has hypotheses of its own.
+    """
+
+    pose: Float[np.ndarray, "4 4"]
+    extents: Float[np.ndarray, "3"]
+    confidence: float
+    hypotheses: tuple[PoseEstimate, ...] = ()
+
+
+@dataclass(frozen=True)
+class PoseEstimator:
+    """A trained model that takes clouds of any size.
+
+    Attributes:
+      trained: The networks, and the categories they were trained on.
+    """
+
+    trained: TrainedModel
+
+    @classmethod
+    def load(cls, name: str) -> PoseEstimator:
+        """The estimator of a category or of an object type, from the weights shipped with the package.
+
+        A category without weights of its own gets its type's. Files are read once.
+
+        Args:
+          name: Such as `"mug"` or `"axial"`.
+
+        Raises:
+          InputError: No such category or type; or there are no weights for it.
+        """
+        if name not in CATALOGUE and name not in OBJECT_TYPES:
+            raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
+        stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
+        folder = Path(str(resources.files(__package__))) / "weights"
+        for stem in stems:
+            if (folder / f"{stem}.npz").is_file():
+                return cls(_read_once(folder / f"{stem}.npz"))
+        raise InputError(
+            f"no weights for {name} in {folder}; train some with `manipose pose train {name}` "
+            "and read them with PoseEstimator.from_file"
+        )
+
+    @classmethod
+    def from_file(cls, path: Path | str) -> PoseEstimator:
+        """The estimator whose weights a training wrote.
+
+        Raises:
+          InputError: The file is missing, truncated or of another version.
+        """
+        return cls(load_weights(Path(path)))
+
+    def estimate(self, cloud: AnyCloud, *, key: PRNGKeyArray) -> PoseEstimate:
+        """The pose of the object that a cloud shows.
+
+        Args:
+          cloud: Points with normals, or points alone: normals are then estimated. Camera frame.
+          key: Of all that is drawn; the same key gives the same answer.
+
+        Raises:
+          InputError: The cloud is no cloud of an object in metres; one line says why.
+        """
+        points, normals = _checked(cloud, key)
+        padded = _padded(points, normals, bucket(len(points)))
+        return _as_estimate(_estimate(self.trained.model, *padded, key=key))
+
+    def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
+        """The poses of many objects at once, padded to the size that the largest needs.
+
+        One compilation for every size and number of clouds.
+
+        Raises:
+          InputError: One of the clouds cannot be used.
+        """
+        if not clouds:
+            return []
+        checked = []
+        for number, cloud in enumerate(clouds):
+            try:
+                checked.append(_checked(cloud, jax.random.fold_in(key, number)))
+            except InputError as error:
+                raise InputError(f"cloud {number}: {error}") from None
+        size = bucket(max(len(points) for points, _ in checked))
+        rows = [_padded(points, normals, size) for points, normals in checked]
+        points, normals, mask = (np.stack(column) for column in zip(*rows, strict=True))
+        found = estimate_batch(self.trained.model, points, normals, mask, key=key)
+        found = jax.tree.map(np.asarray, found)
+        return [_as_estimate(jax.tree.map(lambda leaf: leaf[i], found)) for i in range(len(rows))]
+
+
+def bucket(count: int) -> int:
+    """The padded size of a cloud of `count` points, at most `MAX_POINTS`."""
+    return next(size for size in BUCKETS if count <= size)
+
+
+@eqx.filter_jit
+def _estimate(
+    model: PoseModel,
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    mask: np.ndarray,
+    *,
+    key: PRNGKeyArray,
+) -> Estimates:
+    return estimate_cloud(model, points, normals, mask, key=key)
+
+
+def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
+    """At most `MAX_POINTS` points and their unit normals, towards the camera."""
+    oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
+    points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
+        raise InputError(
+            f"cloud of shape {points.shape} and type {points.dtype}; expected numbers, (points, 3)"
+        )
+    normals = np.asarray(cloud.normals) if oriented else None  # pyright: ignore[reportAttributeAccessIssue]
+    if normals is not None and normals.shape != points.shape:
+        raise InputError(f"normals of shape {normals.shape} with points of shape {points.shape}")
+    if len(points) < MIN_POINTS:
+        raise InputError(f"cloud of {len(points)} points; expected at least {MIN_POINTS}")
+    for what, values in (("points", points), ("normals", normals)):
+        if values is not None and not np.all(np.isfinite(values)):
+            bad = int(np.sum(~np.all(np.isfinite(values), axis=1)))
+            raise InputError(f"{bad} of {len(values)} {what} are not finite; leave them out")
+    middle = np.median(points, axis=0)
+    # Half of the points, so that no stray one decides.
+    span = 4 * float(np.median(np.linalg.norm(points - middle, axis=1)))
+    if span > _LONGEST:
+        hint = ": millimetres? divide by 1000" if span < 1000 * _LONGEST else ""
+        raise InputError(f"cloud about {span:.3g} m across; expected metres{hint}")
+    if span < _SHORTEST:
+        what = "all points are equal" if np.ptp(points, axis=0).max() == 0 else "too small"
+        raise InputError(
+            f"cloud about {1000 * span:.2g} mm across: {what}; expected the surface of an object in metres"
+        )
+    points = points.astype(np.float32)
+    if len(points) > MAX_POINTS:
+        seed = np.asarray(jax.random.key_data(key)).ravel()
+        rows = np.random.default_rng(seed).permutation(len(points))[:MAX_POINTS]
+        points, normals = points[rows], None if normals is None else normals[rows]
+    if normals is None:
+        return points, cloud_normals(points)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.maximum(lengths, 1e-9)
+    away = np.sum(normals * points, axis=1, keepdims=True) > 0
+    return points, np.where(away, -normals, normals).astype(np.float32)
+
+
+def _padded(
+    points: np.ndarray, normals: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    room = ((0, size - len(points)), (0, 0))
+    return np.pad(points, room), np.pad(normals, room), np.arange(size) < len(points)
+
+
+def _as_estimate(found: Estimates) -> PoseEstimate:
+    poses, extents, confidence = (
+        np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
+    )
+    each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
+    return PoseEstimate(each[0].pose, each[0].extents, each[0].confidence, tuple(each[1:]))
+
+
+@lru_cache
+def _read_once(path: Path) -> TrainedModel:
+    return load_weights(path)

@@ -1,0 +1,105 @@
+"""Running a trained model over a set of clouds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from asset_pipeline.catalogue import CATALOGUE
+from asset_pipeline.labelling.label import ObjectType
+from manipose_mj.errors import unknown_name
+from manipose_mj.poses import invert, transform
+from manipose_mj.ppf_jax.clouds import MAX_POINTS, LabelledCloud, batch_clouds
+from manipose_mj.ppf_jax.model import PoseModel
+from manipose_mj.ppf_jax.training import estimate_batch
+from manipose_mj.ppf_jax.view_cache import catalogue_subject
+
+_TIMED = 20  # objects one by one
+RIGID_TYPES: tuple[ObjectType, ...] = ("axial", "mirror", "functional")
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What an estimator said about `n` clouds.
+
+    Attributes:
+      poses: `(n, 4, 4)`, `T_camera_label`.
+      confidence: `(n,)`, higher is surer; NaN where a method has none.
+      ms_per_object: One object at a time, after compilation, on the machine at hand.
+    """
+
+    poses: Float[np.ndarray, "n 4 4"]
+    confidence: Float[np.ndarray, "n"]
+    ms_per_object: float
+
+
+def answers(
+    model: PoseModel, clouds: Sequence[LabelledCloud], *, batch: int = 32, seed: int = 0
+) -> Answers:
+    """The likeliest hypothesis for every cloud.
+
+    Args:
+      model: Trained.
+      clouds: At least one.
+      batch: Clouds at the same time.
+      seed: Of the samples that the model draws; each cloud's depends on its place in the list.
+    """
+    poses, confidence = [], []
+    for start in range(0, len(clouds), batch):
+        some = list(clouds[start : start + batch])
+        padded = batch_clouds(
+            some + some[:1] * (batch - len(some)),
+            rng=np.random.default_rng(start),
+            points=MAX_POINTS,
+        )
+        key = jax.random.fold_in(jax.random.key(seed), start)
+        found = estimate_batch(model, padded.points, padded.normals, padded.mask, key=key)
+        poses.append(np.asarray(found.poses[:, 0])[: len(some)])
+        confidence.append(np.asarray(found.confidence[:, 0])[: len(some)])
+    return Answers(
+        np.concatenate(poses), np.concatenate(confidence), _one_by_one(model, clouds[:_TIMED])
+    )
+
+
+def _one_by_one(model: PoseModel, clouds: Sequence[LabelledCloud]) -> float:
+    """Median milliseconds for one object."""
+    key, spent = jax.random.key(0), []
+    for cloud in (clouds[0], *clouds):
+        single = batch_clouds([cloud], rng=np.random.default_rng(0), points=MAX_POINTS)
+        begin = time.perf_counter()
+        found = estimate_batch(model, single.points, single.normals, single.mask, key=key)
+        jax.block_until_ready(found.poses)
+        spent.append(time.perf_counter() - begin)
+    return 1e3 * float(np.median(spent[1:]))  # the first one compiles
+
+
+def categories_of(name: str) -> tuple[str, ...]:
+    """The rigid categories that a category or a type names.
+
+    Raises:
+      InputError: It names neither.
+    """
+    rigid = {row.name: row.object_type for row in CATALOGUE.values()}
+    rigid = {category: kind for category, kind in rigid.items() if kind in RIGID_TYPES}
+    if name in RIGID_TYPES:
+        return tuple(category for category, kind in rigid.items() if kind == name)
+    if name not in rigid:
+        raise unknown_name("category or type", name, [*RIGID_TYPES, *rigid])
+    return (name,)
+
+
+def catalogue_hulls(clouds: Sequence[LabelledCloud]) -> Mapping[str, Float[np.ndarray, "h 3"]]:
+    """Corners of the convex hulls of the catalogue objects that clouds show, in their label frames."""
+    hulls = {}
+    for cloud in clouds:
+        owner = cloud.name.split("/")[0]
+        if owner not in hulls:
+            index = int(owner.removeprefix(f"{cloud.category}_"))
+            subject = catalogue_subject(cloud.category, index, resting=False)
+            hulls[owner] = transform(invert(subject.label.pose), subject.hull)
+    return hulls

@@ -1,0 +1,184 @@
+"""The whole estimator as one pytree, and what it does to one cloud."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from manipose_mj.poses import compose
+from manipose_mj.ppf_jax.clouds import SAMPLE_POINTS
+from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
+from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
+from manipose_mj.ppf_jax.refinement import (
+    CONFIDENT_LEVEL,
+    RefinementConfig,
+    Refiner,
+    corrected,
+    faced,
+    free_space,
+)
+from manipose_mj.ppf_jax.symmetry import CommonSymmetry
+from manipose_mj.ppf_jax.voting import Hypotheses, VotingConfig, agreement, vote
+
+
+AT_ONCE = 128  # clouds whose votes are in memory together
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """All that fixes a model's shape and how it is run.
+
+    Attributes:
+      symmetry: What all objects of its training share.
+      network: The voting network's sizes.
+      voting: How votes are counted.
+      refinement: The refiner's sizes and steps.
+      pairs: Votes at inference.
+      points: Points of the sample that is looked at.
+    """
+
+    symmetry: CommonSymmetry = CommonSymmetry()
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    voting: VotingConfig = field(default_factory=VotingConfig)
+    refinement: RefinementConfig = field(default_factory=RefinementConfig)
+    pairs: int = 4096
+    points: int = SAMPLE_POINTS
+
+
+class PoseModel(eqx.Module):
+    """The voting network and the refiner."""
+
+    network: VotingNetwork
+    refiner: Refiner
+    config: ModelConfig = eqx.field(static=True)
+
+    def __init__(self, config: ModelConfig, *, key: PRNGKeyArray):
+        network_key, refiner_key = jax.random.split(key)
+        self.network = VotingNetwork(config.network, key=network_key)
+        self.refiner = Refiner(config.refinement, key=refiner_key)
+        self.config = config
+
+
+class Estimates(eqx.Module):
+    """Ranked answers for one cloud.
+
+    Attributes:
+      poses: `(h, 4, 4)`, `T_camera_label`, the likeliest first.
+      extents: `(h, 3)` [m].
+      confidence: `(h,)`, probability of being within 15 deg and 2 cm.
+      voted: `(h, 4, 4)`, the poses before refinement, in the same order.
+    """
+
+    poses: Float[Array, "h 4 4"]
+    extents: Float[Array, "h 3"]
+    confidence: Float[Array, "h"]
+    voted: Float[Array, "h 4 4"]
+
+
+def estimate_cloud(
+    model: PoseModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    *,
+    key: PRNGKeyArray,
+) -> Estimates:
+    """Vote, refine every hypothesis, judge, rank. A pure function of one cloud: `vmap` it.
+
+    Args:
+      model: The networks.
+      points: [m], camera frame, the camera at the origin.
+      normals: Unit, towards the camera.
+      mask: True for points, false for padding.
+      key: Draws the sample, the pairs and the free space.
+    """
+    config = model.config
+    sample_key, pair_key, free_key = jax.random.split(key, 3)
+    cloud = normalised(*sampled(points, normals, mask, count=config.points, key=sample_key))
+    votes, log_extents = cast_votes(model, cloud, config.pairs, key=pair_key)
+    first = faced(vote(votes, config.symmetry, config.voting), cloud, config.symmetry)
+    free = free_space(cloud, config.refinement, key=free_key)
+    few = first_votes(votes, config.voting.coarse_votes)
+    refined = refine(model, cloud, few, log_extents, free, first, config.refinement.steps)
+    agrees = agreement(few, refined, config.symmetry)
+    reading = model.refiner.read(cloud, free, log_extents, refined, agrees)
+    likely = jax.nn.sigmoid(reading.logits)
+    poses = metric_poses(refined, cloud)
+    extents = jnp.exp(jnp.clip(reading.log_extents, -6.0, 6.0)) * cloud.scale
+    # Whatever the networks make of a strange cloud, the answer is a pose: without confidence.
+    sound = jnp.all(jnp.isfinite(poses), axis=(1, 2)) & jnp.all(jnp.isfinite(likely), axis=1)
+    poses = jnp.where(sound[:, None, None], poses, compose(jnp.eye(3), cloud.centre))
+    extents = jnp.where(jnp.isfinite(extents), extents, cloud.scale)
+    likely = jnp.where(sound[:, None], likely, 0.0)
+    order = jnp.argsort(-jnp.sum(likely, axis=-1))
+    return Estimates(
+        poses=poses[order],
+        extents=extents[order],
+        confidence=likely[order, CONFIDENT_LEVEL],
+        voted=metric_poses(first, cloud)[order],
+    )
+
+
+@eqx.filter_jit
+def estimate_batch(
+    model: PoseModel,
+    points: Float[Array, "b n 3"],
+    normals: Float[Array, "b n 3"],
+    mask: Bool[Array, "b n"],
+    *,
+    key: PRNGKeyArray,
+) -> Estimates:
+    """`estimate_cloud` for every row of a batch, `AT_ONCE` at a time to bound the memory."""
+    keys = jax.random.split(key, len(points))
+    rows = (jnp.asarray(points), jnp.asarray(normals), jnp.asarray(mask), keys)
+
+    def one(row: tuple[Array, ...]) -> Estimates:
+        return estimate_cloud(model, *row[:3], key=row[3])
+
+    if len(points) <= AT_ONCE:
+        return jax.vmap(one)(rows)
+    return jax.lax.map(one, rows, batch_size=AT_ONCE)
+
+
+def refine(
+    model: PoseModel,
+    cloud: Cloud,
+    votes: PairVotes,
+    log_extents: Float[Array, "3"],
+    free: Float[Array, "m 3"],
+    hypotheses: Hypotheses,
+    steps: int,
+) -> Hypotheses:
+    """Hypotheses after `steps` corrections by what the refiner reads in each."""
+    symmetry = model.config.symmetry
+
+    def step(current: Hypotheses, _: None) -> tuple[Hypotheses, None]:
+        agrees = agreement(votes, current, symmetry)
+        reading = model.refiner.read(cloud, free, log_extents, current, agrees)
+        return faced(corrected(current, reading), cloud, symmetry), None
+
+    return jax.lax.scan(step, hypotheses, None, length=steps)[0]
+
+
+def cast_votes(
+    model: PoseModel, cloud: Cloud, pairs: int, *, key: PRNGKeyArray
+) -> tuple[PairVotes, Float[Array, "3"]]:
+    """The votes of random pairs, and the logarithm of the extents in the cloud's units."""
+    known, context = model.network.encode(cloud)
+    first, second = random_pairs(cloud, pairs, key=key)
+    votes = model.network.pairs(cloud, known, context, first, second)
+    return votes, model.network.extents(context)
+
+
+def first_votes(votes: PairVotes, count: int) -> PairVotes:
+    """As many of the votes, which are in random order."""
+    return jax.tree.map(lambda leaf: leaf[:count], votes)
+
+
+def metric_poses(hypotheses: Hypotheses, cloud: Cloud) -> Float[Array, "h 4 4"]:
+    """`T_camera_label` [m] of hypotheses in a cloud's units."""
+    return compose(hypotheses.rotation, hypotheses.origin * cloud.scale + cloud.centre)

@@ -1,0 +1,200 @@
+"""The network that tells each pair of points where the label's origin and axes are, and how surely."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from manipose_mj.ppf_jax.features import (
+    PAIR_FEATURES,
+    Cloud,
+    edge_features,
+    neighbours,
+    pair_features,
+)
+
+PAIR_OUTPUTS = 4  # mu, nu, cosine to X, cosine to Y
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Sizes of the voting network.
+
+    Attributes:
+      neighbours: Points whose surface is a point's local context.
+      anchors: Points of the cloud that every point is related to.
+      local_width: Features of the local context.
+      width: Features of a point.
+      pair_width: Features of a pair.
+      pair_layers: Residual layers on these.
+    """
+
+    neighbours: int = 12
+    anchors: int = 24
+    local_width: int = 32
+    width: int = 64
+    pair_width: int = 64
+    pair_layers: int = 2
+
+
+class Dense(eqx.Module):
+    """An affine map of the last axis."""
+
+    weight: Float[Array, "inputs outputs"]
+    bias: Float[Array, "outputs"]
+
+    def __init__(self, inputs: int, outputs: int, *, key: PRNGKeyArray, gain: float = 2.0):
+        self.weight = jax.random.normal(key, (inputs, outputs)) * (gain / inputs) ** 0.5
+        self.bias = jnp.zeros(outputs)
+
+    def __call__(self, x: Float[Array, "*b inputs"]) -> Float[Array, "*b outputs"]:
+        return x @ self.weight + self.bias
+
+
+class PairVotes(eqx.Module):
+    """What each pair says, in the units of the cloud it was drawn from.
+
+    Attributes:
+      start: `(p, 3)`, the first point.
+      along: `(p, 3)`, unit, from the first to the second point.
+      values: `(p, 4)`: signed distance of the origin along `along` from `start` (mu), its distance
+        from the line (nu), and the cosines of `along` to the label's X and Y.
+      log_scale: `(p, 4)`, logarithm of the Laplace scale of each.
+    """
+
+    start: Float[Array, "p 3"]
+    along: Float[Array, "p 3"]
+    values: Float[Array, "p 4"]
+    log_scale: Float[Array, "p 4"]
+
+
+class AnchorLayer(eqx.Module):
+    """Tells every point where it stands against a few points of the cloud, and what these know."""
+
+    of_point: Dense
+    of_anchor: Dense
+    of_pair: Dense
+    merge: Dense
+
+    def __init__(self, inputs: int, width: int, *, key: PRNGKeyArray):
+        keys = jax.random.split(key, 4)
+        self.of_point = Dense(inputs, width, key=keys[0], gain=0.7)
+        self.of_anchor = Dense(inputs, width, key=keys[1], gain=0.7)
+        self.of_pair = Dense(PAIR_FEATURES, width, key=keys[2], gain=0.7)
+        self.merge = Dense(inputs + 2 * width, width, key=keys[3])
+
+    def __call__(
+        self,
+        known: Float[Array, "n inputs"],
+        edges: Float[Array, "n anchors features"],
+        cloud: Cloud,
+    ) -> Float[Array, "n width"]:
+        anchors = edges.shape[1]
+        hidden = jax.nn.relu(
+            self.of_point(known)[:, None]
+            + self.of_anchor(known[:anchors])[None]
+            + self.of_pair(edges)
+        )
+        present = cloud.mask[None, :anchors, None]
+        highest = jnp.max(jnp.where(present, hidden, 0.0), axis=1)
+        mean = jnp.sum(jnp.where(present, hidden, 0.0), axis=1) / jnp.maximum(jnp.sum(present), 1)
+        return jax.nn.relu(self.merge(jnp.concatenate([known, highest, mean], axis=-1)))
+
+
+class VotingNetwork(eqx.Module):
+    """Point encoder with local and global context, a head for pairs and one for the extents."""
+
+    edge: Dense
+    local: Dense
+    anchor_layers: tuple[AnchorLayer, ...]
+    to_global: Dense
+    of_first: Dense
+    of_second: Dense
+    of_pair: Dense
+    of_global: Dense
+    pair_layers: tuple[Dense, ...]
+    votes: Dense
+    size_hidden: Dense
+    size: Dense
+    config: NetworkConfig = eqx.field(static=True)
+
+    def __init__(self, config: NetworkConfig, *, key: PRNGKeyArray):
+        keys = iter(jax.random.split(key, 12 + config.pair_layers))
+        width, pair = config.width, config.pair_width
+        self.config = config
+        self.edge = Dense(PAIR_FEATURES, config.local_width, key=next(keys))
+        self.local = Dense(config.local_width, config.local_width, key=next(keys))
+        self.anchor_layers = (
+            AnchorLayer(config.local_width, width, key=next(keys)),
+            AnchorLayer(width, width, key=next(keys)),
+        )
+        self.to_global = Dense(width, 2 * width, key=next(keys))
+        self.of_first = Dense(width, pair, key=next(keys), gain=0.5)
+        self.of_second = Dense(width, pair, key=next(keys), gain=0.5)
+        self.of_pair = Dense(PAIR_FEATURES, pair, key=next(keys), gain=0.5)
+        self.of_global = Dense(2 * width + 1, pair, key=next(keys), gain=0.5)
+        self.pair_layers = tuple(
+            Dense(pair, pair, key=next(keys), gain=0.5) for _ in range(config.pair_layers)
+        )
+        self.votes = Dense(pair, 2 * PAIR_OUTPUTS, key=next(keys), gain=0.1)
+        self.size_hidden = Dense(2 * width + 1, width, key=next(keys))
+        self.size = Dense(width, 3, key=next(keys), gain=0.1)
+
+    def encode(self, cloud: Cloud) -> tuple[Float[Array, "n width"], Float[Array, "context"]]:
+        """Features of every point and of the whole cloud, its metric size included."""
+        rows, near = neighbours(cloud, self.config.neighbours)
+        hidden = self.local(jax.nn.relu(self.edge(edge_features(cloud, rows))))
+        known = jax.nn.relu(jnp.max(jnp.where(near[..., None], hidden, -1e9), axis=1))
+        anchors = jnp.broadcast_to(
+            jnp.arange(self.config.anchors), (len(known), self.config.anchors)
+        )
+        edges = edge_features(cloud, anchors)
+        for layer in self.anchor_layers:
+            known = layer(known, edges, cloud)
+        seen = jnp.where(cloud.mask[:, None], self.to_global(known), -1e9)
+        size = jnp.log(cloud.scale / 0.05)[None]
+        return known, jnp.concatenate([jax.nn.relu(jnp.max(seen, axis=0)), size])
+
+    def pairs(
+        self,
+        cloud: Cloud,
+        known: Float[Array, "n width"],
+        context: Float[Array, "context"],
+        first: Int[Array, "p"],
+        second: Int[Array, "p"],
+    ) -> PairVotes:
+        """The votes of pairs of rows."""
+        invariants = pair_features(
+            cloud.points[first],
+            cloud.normals[first],
+            cloud.views[first],
+            cloud.points[second],
+            cloud.normals[second],
+        )
+        # The first layer is linear in the points' features: once a point, not once a pair.
+        hidden = (
+            self.of_first(known)[first]
+            + self.of_second(known)[second]
+            + self.of_pair(invariants)
+            + self.of_global(context)
+        )
+        for layer in self.pair_layers:
+            hidden = hidden + layer(jax.nn.relu(hidden))
+        raw = self.votes(jax.nn.relu(hidden))
+        offset = cloud.points[second] - cloud.points[first]
+        length = jnp.sqrt(jnp.sum(offset**2, axis=-1, keepdims=True) + 1e-8)
+        return PairVotes(
+            start=cloud.points[first],
+            along=offset / length,
+            values=raw[:, :PAIR_OUTPUTS],
+            # Between 1 % and a few times the cloud's size: no vote is ever certain or without end.
+            log_scale=3 * jnp.tanh(raw[:, PAIR_OUTPUTS:] / 3) - 1.5,
+        )
+
+    def extents(self, context: Float[Array, "context"]) -> Float[Array, "3"]:
+        """Logarithm of the lengths of the label's bounding box, in units of the cloud's size."""
+        return self.size(jax.nn.relu(self.size_hidden(context))) + 0.7

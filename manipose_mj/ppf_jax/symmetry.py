@@ -1,0 +1,110 @@
+"""Which of the equivalent labels a vote means, and what all objects of a training have in common.
+
+Votes of a pair: among the equivalent frames the one whose X points most along the pair, then the one
+whose Y does. So a box votes for `|cos|` to its axes, a mug for `cos`, a square box for the largest cosine
+to its four sides: a function of the pair alone, without a choice that a network would have to guess.
+Refinement: the equivalent frame that is nearest to the one that is refined. About an axis of
+revolution no Y is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from manipose_mj.poses import SymmetryGroup, rotation_angle
+
+_Y_AFTER_X = 1e-3  # weight of Y in the choice: decides only between frames of one X
+
+
+@dataclass(frozen=True)
+class CommonSymmetry:
+    """What holds for every object that a network is trained on.
+
+    Attributes:
+      axial: X is an axis of revolution.
+      unsigned_x: Some symmetry maps X onto -X.
+      unsigned_y: Some symmetry maps Y onto -Y and leaves X.
+    """
+
+    axial: bool = False
+    unsigned_x: bool = False
+    unsigned_y: bool = False
+
+
+def common_symmetry(groups: Iterable[SymmetryGroup]) -> CommonSymmetry:
+    """What the symmetry groups of a training set share."""
+    known = list(groups)
+
+    def shared(wanted: Float[np.ndarray, "k 3"]) -> bool:
+        """Whether each group has a member that maps the first axes onto these, up to sign."""
+        count = len(wanted)
+        return all(
+            bool(
+                np.any(
+                    np.all(
+                        np.abs(g.rotations[:, :, :count].swapaxes(1, 2) - wanted) < 1e-3,
+                        axis=(1, 2),
+                    )
+                )
+            )
+            for g in known
+        )
+
+    x, y = np.eye(3)[:2]
+    return CommonSymmetry(
+        axial=bool(known) and all(g.axial for g in known),
+        unsigned_x=bool(known) and shared(np.stack([-x])),
+        unsigned_y=bool(known) and shared(np.stack([x, -y])),
+    )
+
+
+def vote_cosines(
+    along: Float[Array, "p 3"],
+    rotation: Float[Array, "3 3"],
+    turns: Float[Array, "k 3 3"],
+    turn_mask: Bool[Array, "k"],
+) -> Float[Array, "p 2"]:
+    """The cosines of each pair to X and Y of the equivalent label that it votes for.
+
+    Args:
+      along: Unit directions of the pairs, in the frame that `rotation` maps into.
+      rotation: Of the label.
+      turns: Its symmetry group.
+      turn_mask: Which of these are members.
+    """
+    cosines = jnp.einsum("pi,kij->pkj", along, (rotation @ turns)[:, :, :2])
+    rank = jnp.where(turn_mask, cosines[..., 0] + _Y_AFTER_X * cosines[..., 1], -jnp.inf)
+    best = jnp.argmax(rank, axis=1)
+    return jnp.take_along_axis(cosines, best[:, None, None], axis=1)[:, 0]
+
+
+def nearest_equivalent(
+    estimate: Float[Array, "3 3"],
+    truth: Float[Array, "3 3"],
+    turns: Float[Array, "k 3 3"],
+    turn_mask: Bool[Array, "k"],
+    axial: Bool[Array, ""],
+) -> Float[Array, "3 3"]:
+    """The rotation equivalent to `truth` that is the least turn away from `estimate`."""
+    equivalents = truth @ turns
+    spun = jnp.where(axial, _spun(estimate, equivalents), equivalents)
+    angles = rotation_angle(estimate[None], spun)
+    return spun[jnp.argmin(jnp.where(turn_mask, angles, jnp.inf))]
+
+
+def _spun(
+    estimate: Float[Array, "3 3"], equivalents: Float[Array, "k 3 3"]
+) -> Float[Array, "k 3 3"]:
+    """The frames turned about their X so that they are nearest to the estimate."""
+    inner = jnp.swapaxes(equivalents, 1, 2) @ estimate
+    # Of Rx(t) with the lower right 2x2 block of `inner`, the trace is largest at this t.
+    angle = jnp.arctan2(inner[:, 2, 1] - inner[:, 1, 2], inner[:, 1, 1] + inner[:, 2, 2])
+    zero, one = jnp.zeros_like(angle), jnp.ones_like(angle)
+    c, s = jnp.cos(angle), jnp.sin(angle)
+    about_x = jnp.stack([one, zero, zero, zero, c, -s, zero, s, c], axis=-1).reshape(-1, 3, 3)
+    return equivalents @ about_x

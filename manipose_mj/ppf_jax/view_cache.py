@@ -1,0 +1,251 @@
+"""Clouds of the catalogue's objects, rendered once into a cache folder and streamed as batches.
+
+A file holds some views of one object and depends on nothing but the object, the setting, the number of
+the file and the code, so that any number of processes can write them in any order.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache, lru_cache
+from importlib.metadata import version
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE, Split, instances
+from asset_pipeline.source_hash import source_hash
+from asset_pipeline.stable_poses import stable_poses
+from asset_pipeline.staging import staging
+from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.clouds import (
+    SAMPLE_POINTS,
+    CloudBatch,
+    LabelledCloud,
+    batch_clouds,
+    most_turns,
+)
+from manipose_mj.ppf_jax.rendering import Occluder, Subject, render_clouds
+from manipose_mj.ppf_jax.source_frames import SourceLabel, label_bounds, source_label
+from manipose_mj.ppf_jax.view_settings import ViewSetting
+
+VIEWS_PER_FILE = 32
+FORMAT = 1  # of the files, and of how this module seeds them
+_OCCLUDERS = 3  # other objects of the catalogue that may stand in front of one
+
+Report = Callable[[int, int, str], None]  # done, of how many, the last one's name
+
+
+def catalogue_clouds(
+    category: str,
+    split: Split,
+    setting: ViewSetting,
+    *,
+    views: int,
+    jobs: int = 1,
+    progress: Report | None = None,
+) -> list[LabelledCloud]:
+    """Views of every object of a category in a split, by object and view; what is missing is rendered.
+
+    The same on every machine, and of the first `views` views whatever was asked for before.
+
+    Args:
+      category: Of the catalogue.
+      split: `"train"` or `"test"`.
+      setting: From where, and how well.
+      views: Of each object.
+      jobs: Processes.
+      progress: Told of every finished object.
+
+    Raises:
+      InputError: There is no such category, or the cache cannot be written.
+    """
+    names = instances(category)
+    row = CATALOGUE[category]
+    if row.object_type == "articulated":
+        raise InputError(f"{category} is articulated; clouds are rendered of rigid categories only")
+    if views < 1:
+        raise InputError(f"{views} views of each object; expected at least 1")
+    wanted = [index for index in range(len(names)) if row.split(index) == split]
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
+        joblib.delayed(_fill)(category, index, setting, views) for index in wanted
+    )
+    for done, index in enumerate(work, 1):
+        if progress is not None:
+            progress(done, len(wanted), names[index])
+    return [cloud for index in wanted for cloud in _read(category, index, setting, views)]
+
+
+def batch_stream(
+    clouds: Sequence[LabelledCloud], batch: int, seed: int, *, points: int = SAMPLE_POINTS
+) -> Callable[[int], Iterator[CloudBatch]]:
+    """Batches of one shape without end, from any step on; each depends on the seed and its step only.
+
+    Every cloud comes once before any comes again; a round may end within a batch.
+
+    Args:
+      clouds: To draw from.
+      batch: Clouds in a batch.
+      seed: Of the order and the points.
+      points: Of each cloud.
+
+    Raises:
+      InputError: There are no clouds.
+    """
+    if not clouds:
+        raise InputError("no clouds to stream; expected at least one")
+    turns, count = most_turns(clouds), len(clouds)
+
+    @lru_cache(maxsize=2)
+    def order(round_: int) -> np.ndarray:
+        return np.random.default_rng([seed, 0, round_]).permutation(count)
+
+    def batches(start: int) -> Iterator[CloudBatch]:
+        for step in itertools.count(start):
+            places = range(step * batch, (step + 1) * batch)
+            chosen = [clouds[order(place // count)[place % count]] for place in places]
+            rng = np.random.default_rng([seed, 1, step])
+            yield batch_clouds(chosen, rng=rng, points=points, turns=turns)
+
+    return batches
+
+
+def catalogue_subject(category: str, index: int, *, resting: bool) -> Subject:
+    """An object of the catalogue, ready to be rendered.
+
+    Args:
+      category: Of the catalogue.
+      index: Which object.
+      resting: Whether its resting poses are needed, which take longer than the rest.
+    """
+    row = CATALOGUE[category]
+    specimen = row.generate(index)
+    body = specimen.bodies[0]
+    surface, center = body.surface(), body.mass_properties.center_of_mass
+    poses = stable_poses(surface, center, label=specimen.label) if resting else ()
+    rests = [(pose.rotation, pose.height, pose.probability) for pose in poses]
+    name = row.instance(index)
+    return Subject.of_mesh(surface, specimen.label, name=name, category=category, rests=rests)
+
+
+def source_labels(clouds: Sequence[LabelledCloud], *, jobs: int = 1) -> dict[str, SourceLabel]:
+    """The frames that the catalogue objects seen in clouds have from their sources, by their names."""
+    owners = {cloud.name.split("/")[0]: cloud.category for cloud in clouds}
+    found = joblib.Parallel(n_jobs=jobs)(
+        joblib.delayed(_source_label)(category, name) for name, category in owners.items()
+    )
+    return dict(zip(owners, found, strict=True))  # pyright: ignore[reportReturnType]
+
+
+def _source_label(category: str, name: str) -> SourceLabel:
+    specimen = CATALOGUE[category].generate(int(name.removeprefix(f"{category}_")))
+    vertices = np.asarray(specimen.bodies[0].surface().vertices)
+    return source_label(name, specimen.label, label_bounds(specimen.label, vertices))
+
+
+def cache_folder(category: str, setting: ViewSetting) -> Path:
+    """Where the views of a category are kept: under `$MANIPOSE_CACHE`, else `~/.cache/manipose-mj`."""
+    root = os.environ.get(CACHE_VARIABLE)
+    home = Path(root) if root else Path.home() / ".cache" / "manipose-mj"
+    return home / "clouds" / f"{category}-{setting.name}-{_code_hash(category, setting)}"
+
+
+@cache
+def _code_hash(category: str, setting: ViewSetting) -> str:
+    # Only what shapes and pictures come from: not all that builds assets.
+    modules = [render_clouds.__module__, CATALOGUE[category].module]
+    if setting.placement != "anywhere":
+        modules.append(stable_poses.__module__)
+    values = repr(replace(setting, name=""))  # its name is in the folder's
+    return source_hash(modules, values, version("numpy"), str(FORMAT))
+
+
+def _file(category: str, index: int, setting: ViewSetting, number: int) -> Path:
+    name = CATALOGUE[category].instance(index)
+    return cache_folder(category, setting) / f"{name}-{number:03d}.npz"
+
+
+def _files(category: str, index: int, setting: ViewSetting, views: int) -> list[Path]:
+    return [_file(category, index, setting, i) for i in range(-(-views // VIEWS_PER_FILE))]
+
+
+def _fill(category: str, index: int, setting: ViewSetting, views: int) -> int:
+    """Render what is missing of one object; returns its index."""
+    files = _files(category, index, setting, views)
+    missing = [number for number, path in enumerate(files) if not path.is_file()]
+    if missing:
+        subject = catalogue_subject(category, index, resting=setting.placement != "anywhere")
+        occluders = _catalogue_occluders(subject.name) if setting.occluded else []
+        for number in missing:
+            # Not the setting: the tables' settings show the same objects in the same random order.
+            rng = np.random.default_rng([zlib.crc32(subject.name.encode()), number])
+            first = number * VIEWS_PER_FILE
+            clouds = render_clouds(
+                subject, setting, VIEWS_PER_FILE, rng, occluders=occluders, first=first
+            )
+            _write(files[number], clouds)
+    return index
+
+
+def _catalogue_occluders(name: str) -> list[Occluder]:
+    """Typical objects of other categories, for one object always the same ones."""
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    rigid = [row for row in CATALOGUE.values() if row.object_type != "articulated"]
+    chosen = rng.choice(len(rigid), _OCCLUDERS, replace=False)
+    return [Occluder.of_mesh(rigid[i].generate(0).bodies[0].surface()) for i in chosen]
+
+
+def _write(path: Path, clouds: Sequence[LabelledCloud]) -> None:
+    """Write aside, then move in place.
+
+    Raises:
+      InputError: The cache cannot be written.
+    """
+    group = clouds[0].symmetry
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with staging(path) as scratch:
+            np.savez(
+                scratch / path.name,
+                points=np.concatenate([cloud.points for cloud in clouds]),
+                normals=np.concatenate([cloud.normals for cloud in clouds]),
+                starts=np.cumsum([0, *(len(cloud) for cloud in clouds)]),
+                pose=np.stack([cloud.pose for cloud in clouds]),
+                extents=clouds[0].extents,
+                rotations=group.rotations,
+                axial=group.axial,
+            )
+            os.replace(scratch / path.name, path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
+            f"set {CACHE_VARIABLE} to a folder with room that can be written"
+        ) from None
+
+
+def _read(category: str, index: int, setting: ViewSetting, views: int) -> list[LabelledCloud]:
+    name, clouds = CATALOGUE[category].instance(index), []
+    for path in _files(category, index, setting, views):
+        with np.load(path) as stored:
+            arrays = dict(stored)
+        group = SymmetryGroup(arrays["rotations"], bool(arrays["axial"]))
+        for i, pose in enumerate(arrays["pose"]):
+            rows = slice(arrays["starts"][i], arrays["starts"][i + 1])
+            clouds.append(
+                LabelledCloud(
+                    points=arrays["points"][rows],
+                    normals=arrays["normals"][rows],
+                    pose=pose,
+                    extents=arrays["extents"],
+                    symmetry=group,
+                    name=f"{name}/{len(clouds)}",
+                    category=category,
+                )
+            )
+    return clouds[:views]

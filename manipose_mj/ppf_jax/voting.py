@@ -1,0 +1,273 @@
+"""From the votes of pairs to poses: coarse scores of candidates, then robust least squares.
+
+No vote is scattered into a grid. A candidate is scored by how many votes it satisfies, each weighed by
+the square of the certainty it claims; a vote that is off by more than it allows loses its say (Cauchy's
+kernel). Polishing repeats weighted least squares, for `along . axis = cosine` and
+`along . (origin - start) = mu` are linear: 3x3 solves. Several hypotheses come out of the peaks of the scores.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from manipose_mj.ppf_jax.network import PairVotes
+from manipose_mj.ppf_jax.symmetry import CommonSymmetry
+
+_RIDGE = 1e-4  # keeps a solve regular when all pairs lie in one plane
+
+
+@dataclass(frozen=True)
+class VotingConfig:
+    """How votes are counted.
+
+    Attributes:
+      coarse_votes: Votes that score candidates; all polish.
+      directions: Candidates for X on the sphere.
+      turns: Candidates for Y about a given X.
+      origin_steps: Candidates for the origin along each side of the cube around the cloud.
+      origin_reach: Half that side, in units of the cloud's size.
+      axes_kept: Peaks of X that become hypotheses.
+      turns_kept: Peaks of Y for each of them.
+      separation: Between peaks [rad].
+      polishing: Rounds of least squares.
+    """
+
+    coarse_votes: int = 1000
+    directions: int = 480
+    turns: int = 64
+    origin_steps: int = 8
+    origin_reach: float = 2.4
+    axes_kept: int = 4
+    turns_kept: int = 2
+    separation: float = np.radians(35.0)
+    polishing: int = 5
+
+
+class Hypotheses(eqx.Module):
+    """Candidate poses in the frame and units of a normalised cloud.
+
+    Attributes:
+      rotation: `(h, 3, 3)`, columns are the label's axes.
+      origin: `(h, 3)`.
+    """
+
+    rotation: Float[Array, "h 3 3"]
+    origin: Float[Array, "h 3"]
+
+
+class _Linear(NamedTuple):
+    """Votes `direction . unknown = value`, and how certain each is (1 / scale^2)."""
+
+    direction: Float[Array, "p 3"]
+    value: Float[Array, "p"]
+    certainty: Float[Array, "p"]
+
+
+def fibonacci_sphere(count: int) -> Float[np.ndarray, "count 3"]:
+    """Unit directions spread evenly over the sphere."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=-1)
+
+
+def vote(votes: PairVotes, symmetry: CommonSymmetry, config: VotingConfig) -> Hypotheses:
+    """`axes_kept * turns_kept` poses, best first by no rule: a verifier ranks them.
+
+    An axis of revolution has no Y to vote for: one turn is kept, the one that looks at the camera.
+
+    Args:
+      votes: At least `coarse_votes` of them.
+      symmetry: What all objects of the network's training share.
+      config: How to count.
+    """
+    x_votes, y_votes = _cosine_votes(votes, 2), _cosine_votes(votes, 3)
+    few_x, few_y = (_first(v, config.coarse_votes) for v in (x_votes, y_votes))
+    sphere = jnp.asarray(fibonacci_sphere(config.directions), votes.values.dtype)
+    scores = _direction_scores(few_x, sphere, symmetry.unsigned_x)
+    peaks = _peaks(scores, sphere, config.axes_kept, config.separation, symmetry.unsigned_x)
+    x_axes = jax.vmap(
+        lambda start: _polished_direction(x_votes, start, symmetry.unsigned_x, config.polishing)
+    )(peaks)
+    if symmetry.axial:
+        y_axes = jax.vmap(_any_perpendicular)(x_axes)[:, None]
+    else:
+        y_axes = jax.vmap(lambda x: _turns_about(x, few_y, y_votes, symmetry, config))(x_axes)
+    x_axes = jnp.broadcast_to(x_axes[:, None], y_axes.shape).reshape(-1, 3)
+    y_axes = y_axes.reshape(-1, 3)
+    start = _coarse_origin(jax.tree.map(lambda leaf: leaf[: config.coarse_votes], votes), config)
+    origin = _polished_origin(votes, start, config.polishing)
+    rotation = jnp.stack([x_axes, y_axes, jnp.cross(x_axes, y_axes)], axis=-1)
+    return Hypotheses(rotation, jnp.broadcast_to(origin, x_axes.shape))
+
+
+def agreement(
+    votes: PairVotes, hypothesis: Hypotheses, symmetry: CommonSymmetry
+) -> Float[Array, "h 4"]:
+    """The certainty-weighted share of votes for mu, nu, X and Y that each hypothesis satisfies."""
+    offset = hypothesis.origin[:, None] - votes.start
+    mu = jnp.sum(offset * votes.along, axis=-1)
+    nu = jnp.sqrt(jnp.maximum(jnp.sum(offset**2, axis=-1) - mu**2, 1e-8))
+    cosines = jnp.einsum("pi,hij->hpj", votes.along, hypothesis.rotation[:, :, :2])
+    x = jnp.abs(cosines[..., 0]) if symmetry.unsigned_x else cosines[..., 0]
+    y = jnp.abs(cosines[..., 1]) if symmetry.unsigned_y else cosines[..., 1]
+    residual = jnp.stack([mu, nu, x, y], axis=-1) - votes.values
+    weight = jnp.exp(-2 * votes.log_scale)
+    kept = weight / (1 + (residual / jnp.exp(votes.log_scale)) ** 2)
+    return jnp.sum(kept, axis=1) / jnp.sum(weight, axis=0)
+
+
+def _cosine_votes(votes: PairVotes, column: int) -> _Linear:
+    certainty = jnp.exp(-2 * votes.log_scale[:, column])
+    return _Linear(votes.along, votes.values[:, column], certainty)
+
+
+def _first(votes: _Linear, count: int) -> _Linear:
+    return _Linear(*(leaf[:count] for leaf in votes))
+
+
+def _direction_scores(
+    votes: _Linear, candidates: Float[Array, "c 3"], unsigned: bool
+) -> Float[Array, "c"]:
+    """How well each candidate satisfies the votes, blurred to the candidates' spacing."""
+    cosine = votes.direction @ candidates.T
+    residual = (jnp.abs(cosine) if unsigned else cosine) - votes.value[:, None]
+    spread = 1 / votes.certainty + 4 * jnp.pi / len(candidates) / 4
+    kernel = 1 / (1 + residual**2 / spread[:, None])
+    return votes.certainty @ kernel
+
+
+def _peaks(
+    scores: Float[Array, "c"],
+    candidates: Float[Array, "c 3"],
+    count: int,
+    separation: float,
+    unsigned: bool,
+) -> Float[Array, "count 3"]:
+    """The best candidates that are pairwise further apart than `separation`."""
+
+    def take(scores: Array, _: None) -> tuple[Array, Array]:
+        best = candidates[jnp.argmax(scores)]
+        cosine = candidates @ best
+        close = (jnp.abs(cosine) if unsigned else cosine) > np.cos(separation)
+        return jnp.where(close, -jnp.inf, scores), best
+
+    return jax.lax.scan(take, scores, None, length=count)[1]
+
+
+def _polished_direction(
+    votes: _Linear, start: Float[Array, "3"], unsigned: bool, rounds: int
+) -> Float[Array, "3"]:
+    """The direction near `start` that the votes around it agree on."""
+
+    def refine(_: int, axis: Array) -> Array:
+        cosine = votes.direction @ axis
+        value = jnp.where(cosine < 0, -votes.value, votes.value) if unsigned else votes.value
+        weight = _cauchy(votes.certainty, cosine - value)
+        solved = _solve(votes.direction, value, weight, axis)
+        return _unit(solved, axis)
+
+    return jax.lax.fori_loop(0, rounds, refine, start)
+
+
+def _turns_about(
+    x: Float[Array, "3"],
+    few: _Linear,
+    votes: _Linear,
+    symmetry: CommonSymmetry,
+    config: VotingConfig,
+) -> Float[Array, "turns 3"]:
+    """The peaks of Y about a given X."""
+    first = _any_perpendicular(x)
+    angles = np.arange(config.turns) * (2 * np.pi / config.turns)
+    circle = np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * jnp.cross(x, first)
+    scores = _direction_scores(few, circle, symmetry.unsigned_y)
+    starts = _peaks(scores, circle, config.turns_kept, config.separation, symmetry.unsigned_y)
+
+    def polished(start: Array) -> Array:
+        y = _polished_direction(votes, start, symmetry.unsigned_y, config.polishing)
+        return _unit(y - (y @ x) * x, start)
+
+    return jax.vmap(polished)(starts)
+
+
+def _coarse_origin(votes: PairVotes, config: VotingConfig) -> Float[Array, "3"]:
+    side = np.linspace(-config.origin_reach, config.origin_reach, config.origin_steps)
+    grid = jnp.asarray(np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3))
+    grid = grid.astype(votes.start.dtype)
+    # |o - a|^2 and (o - a).d for all votes and candidates, as products of matrices.
+    mu = votes.along @ grid.T - jnp.sum(votes.along * votes.start, axis=-1)[:, None]
+    squares = (
+        jnp.sum(grid**2, axis=-1)
+        - 2 * votes.start @ grid.T
+        + jnp.sum(votes.start**2, axis=-1)[:, None]
+    )
+    nu = jnp.sqrt(jnp.maximum(squares - mu**2, 1e-8))
+    spacing = (side[1] - side[0]) / 2
+    spread = jnp.exp(2 * votes.log_scale[:, :2]) + spacing**2
+    residual = (mu - votes.values[:, :1]) ** 2 / spread[:, :1]
+    residual = residual + (nu - votes.values[:, 1:2]) ** 2 / spread[:, 1:]
+    certainty = jnp.exp(-votes.log_scale[:, 0] - votes.log_scale[:, 1])
+    return grid[jnp.argmax(certainty @ (1 / (1 + residual)))]
+
+
+def _polished_origin(votes: PairVotes, start: Float[Array, "3"], rounds: int) -> Float[Array, "3"]:
+    """The point nearest to the circles (mu, nu) of the votes around it."""
+    certainty = jnp.exp(-2 * votes.log_scale[:, :2])
+
+    def refine(_: int, origin: Array) -> Array:
+        offset = origin - votes.start
+        mu = jnp.sum(offset * votes.along, axis=-1)
+        across = offset - mu[:, None] * votes.along
+        nu = jnp.sqrt(jnp.sum(across**2, axis=-1) + 1e-8)
+        across = across / nu[:, None]
+        rows = jnp.concatenate([votes.along, across])
+        wanted = jnp.concatenate([votes.values[:, 0], votes.values[:, 1]])
+        residual = jnp.concatenate([mu, nu]) - wanted
+        weight = _cauchy(jnp.concatenate([certainty[:, 0], certainty[:, 1]]), residual)
+        # The change that takes the residuals away.
+        return origin - _solve(rows, residual, weight, jnp.zeros(3))
+
+    return jax.lax.fori_loop(0, rounds, refine, start)
+
+
+def _cauchy(certainty: Float[Array, "p"], residual: Float[Array, "p"]) -> Float[Array, "p"]:
+    return certainty / (1 + certainty * residual**2)
+
+
+def _solve(
+    rows: Float[Array, "p 3"],
+    values: Float[Array, "p"],
+    weight: Float[Array, "p"],
+    prior: Float[Array, "3"],
+) -> Float[Array, "3"]:
+    """Weighted least squares of `rows @ unknown = values`, drawn a little towards `prior`."""
+    weight = weight / (jnp.sum(weight) + 1e-12)
+    weighted = rows * weight[:, None]
+    matrix = rows.T @ weighted + _RIDGE * jnp.eye(3)
+    return _solve3(matrix, values @ weighted + _RIDGE * prior)
+
+
+def _solve3(matrix: Float[Array, "3 3"], right: Float[Array, "3"]) -> Float[Array, "3"]:
+    """The solution by Cramer's rule: batched LU of tiny matrices is slow everywhere."""
+    a, b, c = matrix[0], matrix[1], matrix[2]
+    bc, ca, ab = jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)
+    return (right[0] * bc + right[1] * ca + right[2] * ab) / (a @ bc)
+
+
+def _unit(vector: Float[Array, "3"], otherwise: Float[Array, "3"]) -> Float[Array, "3"]:
+    length = jnp.sqrt(jnp.sum(vector**2))
+    return jnp.where(length > 1e-6, vector / jnp.maximum(length, 1e-6), otherwise)
+
+
+def _any_perpendicular(axis: Float[Array, "3"]) -> Float[Array, "3"]:
+    smallest = jax.nn.one_hot(jnp.argmin(jnp.abs(axis)), 3, dtype=axis.dtype)
+    across = smallest - (smallest @ axis) * axis
+    return across / jnp.sqrt(jnp.sum(across**2))

@@ -1,0 +1,123 @@
+"""Files of trained weights: half-precision arrays and the configuration that gives them their shapes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
+from manipose_mj.ppf_jax.network import NetworkConfig
+from manipose_mj.ppf_jax.refinement import RefinementConfig
+from manipose_mj.ppf_jax.symmetry import CommonSymmetry
+from manipose_mj.ppf_jax.voting import VotingConfig
+
+FORMAT_VERSION = 1
+_HEADER = "header"
+
+
+@dataclass(frozen=True)
+class TrainedModel:
+    """A model and what it was trained on.
+
+    Attributes:
+      model: The networks.
+      categories: Of the objects it was trained on.
+    """
+
+    model: PoseModel
+    categories: tuple[str, ...]
+
+
+def save_weights(path: Path, trained: TrainedModel) -> None:
+    """Write a model to a file, whole or not at all."""
+    header = {
+        "format": FORMAT_VERSION,
+        "categories": trained.categories,
+        "config": dataclasses.asdict(trained.model.config),
+    }
+    leaves = jax.tree.leaves(eqx.filter(trained.model, eqx.is_array))
+    arrays = {f"leaf_{i:03d}": np.asarray(leaf, np.float16) for i, leaf in enumerate(leaves)}
+    arrays[_HEADER] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as scratch, open(scratch, "wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def load_weights(path: Path) -> TrainedModel:
+    """Read a model.
+
+    Raises:
+      InputError: The file is missing, truncated, of another version or no file of weights at all.
+    """
+    try:
+        with np.load(path) as stored:
+            header = json.loads(bytes(stored[_HEADER]))
+            arrays = [stored[name] for name in sorted(stored.files) if name != _HEADER]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file of weights") from None
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zipfile.zlib.error):  # pyright: ignore[reportAttributeAccessIssue]
+        raise InputError(
+            f"{path}: not a whole file of weights; copy it again or train anew"
+        ) from None
+    if header.get("format") != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: weights of format {header.get('format')}; this version reads "
+            f"{FORMAT_VERSION}: train anew or install the version that wrote them"
+        )
+    try:
+        config = _config(header["config"])
+        blank = eqx.filter_eval_shape(PoseModel, config, key=jax.random.key(0))
+        shapes, structure = jax.tree.flatten(eqx.filter(blank, eqx.is_array_like))
+        if [leaf.shape for leaf in shapes] != [array.shape for array in arrays]:
+            raise ValueError("shapes")
+        categories = tuple(header["categories"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: the weights do not fit their configuration; train anew"
+        ) from None
+    model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
+    return TrainedModel(model, categories)
+
+
+class replacing:  # noqa: N801
+    """A scratch path that takes the place of `path` at once when all went well."""
+
+    def __init__(self, path: Path):
+        self._path = path
+
+    def __enter__(self) -> Path:
+        handle, name = tempfile.mkstemp(dir=self._path.parent, prefix=f".{self._path.name}-")
+        os.close(handle)
+        self._scratch = Path(name)
+        return self._scratch
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is None:
+            os.replace(self._scratch, self._path)
+        else:
+            self._scratch.unlink(missing_ok=True)
+
+
+def _config(stored: dict[str, Any]) -> ModelConfig:
+    refinement = dict(stored["refinement"])
+    refinement["widths"] = tuple(refinement["widths"])
+    return ModelConfig(
+        symmetry=CommonSymmetry(**stored["symmetry"]),
+        network=NetworkConfig(**stored["network"]),
+        voting=VotingConfig(**stored["voting"]),
+        refinement=RefinementConfig(**refinement),
+        pairs=stored["pairs"],
+        points=stored["points"],
+    )
