@@ -41,6 +41,14 @@ import yaml
 from jaxtyping import Float
 
 from asset_pipeline.labelling.label import OBJECT_TYPES, ObjectType
+from asset_pipeline.labelling.override_fields import (
+    direction,
+    kind_of,
+    mapping,
+    numbers,
+    require_known,
+    rotation_of,
+)
 from asset_pipeline.labelling.symmetry_names import SYMMETRIES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup
@@ -50,8 +58,6 @@ SCAN_TYPES = ("axial", "mirror", "functional")
 FRAME_KEYS = ("origin", "x", "y", "rotation", "symmetry", "nudge")
 HANDLE_KEYS = (*FRAME_KEYS, "extents")
 ENTRY_KEYS = (*FRAME_KEYS, "object_type", "up", "functional", "category", "mass", "parts")
-# Two axes nearer to each other than this do not fix a frame; axes farther from square are a slip.
-SQUARE = np.deg2rad(30.0)
 
 
 @dataclass(frozen=True)
@@ -148,7 +154,7 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
     if document is None:
         return {}
     if not isinstance(document, dict):
-        raise InputError(f"{path}: holds {_kind(document)}; expected objects' names with entries")
+        raise InputError(f"{path}: holds {kind_of(document)}; expected objects' names with entries")
     seen: set[str] = set()
     for key, _ in root.value:
         if key.value in seen:
@@ -158,7 +164,9 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
         if not isinstance(name, str):
             raise InputError(f'{path}: object {name!r} is no text; write the name in quotes: "..."')
         if not isinstance(entry, dict):
-            raise InputError(f"{path}: {name}: is {_kind(entry)}; expected fields such as 'origin'")
+            raise InputError(
+                f"{path}: {name}: is {kind_of(entry)}; expected fields such as 'origin'"
+            )
     return document
 
 
@@ -169,7 +177,7 @@ def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
       InputError: A field is unknown or has a wrong value.
     """
     where = f"{path}: {name}"
-    _require_known(where, "field", entry, ENTRY_KEYS)
+    require_known(where, "field", entry, ENTRY_KEYS)
     kind = entry.get("object_type")
     if kind is not None and kind not in SCAN_TYPES:
         if kind in OBJECT_TYPES:
@@ -181,134 +189,66 @@ def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
     if category is not None and not (isinstance(category, str) and category.strip()):
         raise InputError(f"{where}: category: is {category!r}; expected a name such as mug")
     if mass is not None:
-        mass = _numbers(where, "mass", [mass], 1)[0]
+        mass = numbers(where, "mass", [mass], 1)[0]
         if mass <= 0:
             raise InputError(f"{where}: mass: is {mass:g}; expected a positive number of kg")
-    parts = _mapping(where, "parts", entry.get("parts", {}))
+    parts = mapping(where, "parts", entry.get("parts", {}))
+    for part in parts:
+        if not isinstance(part, str):
+            raise InputError(
+                f'{where}: parts: {part!r} is no text; write the name in quotes: "..."'
+            )
+    digest = hashlib.sha256(json.dumps(entry, sort_keys=True, default=str).encode()).hexdigest()
     return Override(
         frame=_frame(where, {key: entry[key] for key in FRAME_KEYS if key in entry}),
         object_type=kind,
-        up=_direction(where, "up", entry),
-        functional=_direction(where, "functional", entry),
+        up=direction(where, "up", entry),
+        functional=direction(where, "functional", entry),
         category=category,
         mass=mass,
         parts={
-            str(name): _part(f"{where}: parts: {name}", _mapping(where, f"parts: {name}", part))
+            name: _part(f"{where}: parts: {name}", mapping(where, f"parts: {name}", part))
             for name, part in parts.items()
         },
         where=where,
-        digest=hashlib.sha256(json.dumps(entry, sort_keys=True, default=str).encode()).hexdigest()[
-            :12
-        ],
+        digest=digest[:12],
     )
 
 
 def _part(where: str, entry: dict[str, Any]) -> PartOverride:
-    _require_known(where, "field", entry, ("handle", "joint"))
+    require_known(where, "field", entry, ("handle", "joint"))
     handle = None
     if "handle" in entry:
         handle = _frame(
-            f"{where}: handle", _mapping(where, "handle", entry["handle"]), keys=HANDLE_KEYS
+            f"{where}: handle", mapping(where, "handle", entry["handle"]), keys=HANDLE_KEYS
         )
-    joint = _mapping(where, "joint", entry.get("joint", {}))
-    _require_known(f"{where}: joint", "field", joint, ("origin", "axis"))
+    joint = mapping(where, "joint", entry.get("joint", {}))
+    require_known(f"{where}: joint", "field", joint, ("origin", "axis"))
     origin = None
     if "origin" in joint:
-        origin = _numbers(where, "joint: origin", joint["origin"], 3)
-    return PartOverride(handle, origin, _direction(f"{where}: joint", "axis", joint))
+        origin = numbers(where, "joint: origin", joint["origin"], 3)
+    return PartOverride(handle, origin, direction(f"{where}: joint", "axis", joint))
 
 
 def _frame(where: str, entry: dict[str, Any], keys: tuple[str, ...] = FRAME_KEYS) -> FrameOverride:
-    _require_known(where, "field", entry, keys)
-    extents = _numbers(where, "extents", entry["extents"], 3) if "extents" in entry else None
+    require_known(where, "field", entry, keys)
+    extents = numbers(where, "extents", entry["extents"], 3) if "extents" in entry else None
     if extents is not None and (extents <= 0).any():
         raise InputError(f"{where}: extents: is {entry['extents']}; expected 3 positive lengths")
-    origin = _numbers(where, "origin", entry["origin"], 3) if "origin" in entry else None
+    origin = numbers(where, "origin", entry["origin"], 3) if "origin" in entry else None
     symmetry = None
     if "symmetry" in entry:
         name = entry["symmetry"]
         if not isinstance(name, str) or name not in SYMMETRIES:
             raise InputError(f"{where}: symmetry: {unknown_name('group', str(name), SYMMETRIES)}")
         symmetry = SYMMETRIES[name]
-    nudge = _mapping(where, "nudge", entry.get("nudge", {}))
-    _require_known(f"{where}: nudge", "field", nudge, ("turn", "shift"))
+    nudge = mapping(where, "nudge", entry.get("nudge", {}))
+    require_known(f"{where}: nudge", "field", nudge, ("turn", "shift"))
     return FrameOverride(
         origin=origin,
-        rotation=_rotation(where, entry),
+        rotation=rotation_of(where, entry),
         symmetry=symmetry,
-        turn=np.deg2rad(_numbers(where, "nudge: turn", nudge.get("turn", [0, 0, 0]), 3)),
-        shift=_numbers(where, "nudge: shift", nudge.get("shift", [0, 0, 0]), 3),
+        turn=np.deg2rad(numbers(where, "nudge: turn", nudge.get("turn", [0, 0, 0]), 3)),
+        shift=numbers(where, "nudge: shift", nudge.get("shift", [0, 0, 0]), 3),
         extents=extents,
     )
-
-
-def _rotation(where: str, entry: dict[str, Any]) -> Float[np.ndarray, "3 3"] | None:
-    if "rotation" in entry:
-        if "x" in entry or "y" in entry:
-            raise InputError(f"{where}: has both 'rotation' and axes; expected one of the two")
-        rows = _numbers(where, "rotation", entry["rotation"], (3, 3))
-        if not np.allclose(rows @ rows.T, np.eye(3), atol=1e-3) or np.linalg.det(rows) < 0:
-            raise InputError(
-                f"{where}: rotation: is not a right-handed rotation matrix; expected three rows "
-                "whose columns are unit X, Y, Z, square to each other"
-            )
-        u, _, v = np.linalg.svd(rows)  # the nearest exact one
-        return u @ v
-    x, y = _direction(where, "x", entry), _direction(where, "y", entry)
-    if x is None and y is None:
-        return None
-    if x is None or y is None:
-        raise InputError(f"{where}: {'x' if x is None else 'y'}: missing; a frame needs both axes")
-    if abs(x @ y) > np.sin(SQUARE):
-        angle = np.degrees(np.arccos(np.clip(x @ y, -1, 1)))
-        raise InputError(f"{where}: y: is {angle:.0f} deg from x; expected about 90 deg")
-    y = y - (y @ x) * x
-    y = y / np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
-
-
-def _direction(where: str, key: str, entry: dict[str, Any]) -> Float[np.ndarray, "3"] | None:
-    if key not in entry:
-        return None
-    vector = _numbers(where, key, entry[key], 3)
-    length = np.linalg.norm(vector)
-    if length < 1e-9:
-        raise InputError(f"{where}: {key}: has no length; expected a direction such as [0, 0, 1]")
-    return vector / length
-
-
-def _numbers(where: str, key: str, value: Any, shape: int | tuple[int, ...]) -> np.ndarray:
-    try:
-        array = np.asarray(value, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    shape = (shape,) if isinstance(shape, int) else shape
-    if array.shape != shape or not np.isfinite(array).all() or _has_text(value):
-        count = "a finite number" if shape == (1,) else f"{' x '.join(map(str, shape))} numbers"
-        shown = value[0] if shape == (1,) else value
-        raise InputError(f"{where}: {key}: is {shown!r}; expected {count}")
-    return array
-
-
-def _has_text(value: Any) -> bool:
-    """Whether NumPy has taken text or truth values for numbers."""
-    if isinstance(value, list):
-        return any(_has_text(each) for each in value)
-    return isinstance(value, str | bool)
-
-
-def _mapping(where: str, key: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{where}: {key}: is {_kind(value)}; expected fields with values")
-    return value
-
-
-def _require_known(where: str, kind: str, entry: dict[str, Any], known: tuple[str, ...]) -> None:
-    for key in entry:
-        if key not in known:
-            raise InputError(f"{where}: {unknown_name(kind, str(key), known)}")
-
-
-def _kind(value: Any) -> str:
-    names = {list: "a list", str: "text", type(None): "empty", dict: "a mapping"}
-    return names.get(type(value), repr(value))

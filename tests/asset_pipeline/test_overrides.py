@@ -78,6 +78,7 @@ def test_the_documented_file_is_read_and_every_documented_field_is_known(tmp_pat
         ({"category": 7}, "category: is 7; expected a name"),
         ({"nudge": {"twist": [0, 0, 1]}}, "nudge: unknown field 'twist'"),
         ({"nudge": [0, 0, 1]}, "nudge: is a list; expected fields"),
+        ({"parts": {"a": {}, 7: {}}}, "parts: 7 is no text; write the name in quotes"),
         ({"parts": {"lid": {"hinge": {}}}}, "parts: lid: unknown field 'hinge'"),
         ({"parts": {"lid": {"joint": {"axis": [0, 0, 0]}}}}, "lid: joint: axis: has no length"),
         ({"parts": {"lid": {"handle": {"extents": [1, 0, 1]}}}}, "extents: .*3 positive lengths"),

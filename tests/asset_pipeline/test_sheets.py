@@ -33,7 +33,7 @@ def test_axes_are_seen_through_the_object_from_the_labels_side(tmp_path):
     ends = {}
     for name, colour in (("x", RED), ("y", GREEN), ("z", BLUE)):
         own = _pixels(picture, colour)
-        assert len(own) > 20, name
+        assert len(own) > 12, name
         ends[name] = own[np.linalg.norm(own, axis=1).argmax()]
     assert ends["x"][1] > 40 and abs(ends["x"][0]) < 5  # up
     assert ends["y"][0] < -8 and ends["z"][0] > 8
