@@ -143,7 +143,9 @@ def _geom_element(
         return geom
     assert shape.mesh is not None
     file = f"meshes/{name}.obj"
-    write_obj(shape.mesh, folder / file, digits=6 if "_collision_" in name else 5)
+    # Generated looks need no more than 10 um; a scan stays as published, other data refer to its frame.
+    exact = "_collision_" in name or shape.texture is not None
+    write_obj(shape.mesh, folder / file, digits=6 if exact else 5)
     ElementTree.SubElement(assets, "mesh", name=name, file=file, inertia="shell")
     geom.set("mesh", name)
     if shape.texture is not None:

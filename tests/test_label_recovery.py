@@ -17,6 +17,7 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks" / "label_recovery.py"
 def recovery():
     """The script as a module; benchmarks are no package."""
     spec = importlib.util.spec_from_file_location("label_recovery", SCRIPT)
+    assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # where dataclasses look their module up
     spec.loader.exec_module(module)

@@ -22,7 +22,8 @@ from asset_pipeline.labelling.upright import MAX_LEAN, upright
 
 STARTS = 12  # normals around up from which planes are sought
 REFINED = 4  # of which as many are fitted finely
-CLEAN = 0.0005  # what a whole thing's plane leaves beside twice the noise, at most [m]
+AS_LONG = 0.03  # lengths that differ by a smaller share are alike
+CLEAN = 0.0006  # what a whole thing's plane leaves beside twice the noise, at most [m]
 SQUARE = np.deg2rad(3.0)  # two planes are square to each other to within
 CLEAR_REACH = 0.03  # the side that breaks the symmetry reaches farther by this share of the length
 
@@ -35,7 +36,7 @@ def mirror_label(
     """The frame of an object with upright mirror planes.
 
     - Two planes (square to each other): X is where they meet, upwards; Y is along the longer
-      horizontal length, its sign the one with a positive first large component in the mesh frame.
+      horizontal length (of a round lid along its handle, where more of the surface is far out), its sign the one with a positive first large component in the mesh frame.
     - One plane: X is in it, square to what the object stands on (`upright`); Y lies in it, towards the
       side that breaks the symmetry: where the bounding box reaches farther from the centroid of the
       surface.
@@ -52,7 +53,7 @@ def mirror_label(
     """
     first, second, tolerance = _planes(cloud, up)
     residuals = {"plane": residual(cloud, mirror(first[0]), first[0] * first[1])}
-    limit = tolerance.limit(cloud)
+    limit = STRICT.limit(cloud) * (1 if tolerance is STRICT else 2)
     evidence = [fits(residuals["plane"], limit)]
     if second is not None:
         residuals["second_plane"] = residual(cloud, mirror(second[0]), second[0] * second[1])
@@ -60,8 +61,7 @@ def mirror_label(
         x = np.cross(first[0], second[0])
         x = x / np.linalg.norm(x) * np.sign(x @ up)
         sides = [n - (n @ x) * x for n in (first[0], second[0])]
-        lengths = [np.ptp(cloud.points @ n) for n in sides]
-        y = positive(sides[int(np.argmax(lengths))])
+        y = positive(_longer(cloud, *sides))
     else:
         normal = first[0]
         x, footing = upright(cloud, up, normal)
@@ -107,6 +107,15 @@ def _planes(cloud: SurfaceCloud, up: np.ndarray) -> tuple[Plane, Plane | None, T
     if pairs:
         return *min(pairs, key=lambda pair: pair[0])[1:], tolerance
     return first, None, tolerance
+
+
+def _longer(cloud: SurfaceCloud, a: np.ndarray, b: np.ndarray) -> Float[np.ndarray, "3"]:
+    """Along which the shape is longer; where it is as long both ways, along which it spreads more."""
+    first, second = cloud.points @ a, cloud.points @ b
+    lengths = float(np.ptp(first)), float(np.ptp(second))
+    if abs(lengths[0] - lengths[1]) > AS_LONG * max(lengths):
+        return a if lengths[0] > lengths[1] else b
+    return a if first.std() >= second.std() else b
 
 
 def positive(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:

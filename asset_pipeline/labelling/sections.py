@@ -19,7 +19,7 @@ DEPARTURE = 0.04
 # What is no larger then is a slope, not a step: it began where the slope starts, so many slices before.
 GRADUAL, MAX_BACK = 0.16, 2.5
 
-ON_LINE = 0.0006  # a section's centre is on the axis to within [m]
+ON_LINE = 0.0004  # a section's centre is on the axis to within [m]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def joint(
 
     At every place the mean logarithms of thickness and width on either side are compared. A peak of
     their change above `step` (the first, or the largest) is a step; it begins where the section departs
-    from that before it by `DEPARTURE`, or by `begun` of the step where that is more.
+    from that before it, towards that after it, by `DEPARTURE`, or by `begun` of the step where that is more.
 
     Args:
       sections: From the grip's end.
@@ -115,7 +115,9 @@ def joint(
     size = float(change[start : min(start + window, last) + 1].max())
     level = np.median(logs[:, max(0, start - 2 * window) : start - window + 1], axis=1)
     limit = max(DEPARTURE * len(logs), begun * size)
-    departure = np.abs(logs - level[:, None]).sum(axis=0)
+    after = logs[:, start : start + window].mean(axis=1)
+    towards = np.sign(after - logs[:, start - window : start].mean(axis=1))
+    departure = (towards[:, None] * (logs - level[:, None])).sum(axis=0)
     departed = departure > limit
     begin = start - window
     while begin < start + window and not departed[begin : begin + 3].all():

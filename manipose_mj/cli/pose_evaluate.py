@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from manipose_mj.cli.pose_train import WEIGHTS_FILE, Name
+from manipose_mj.cli.pose_train import Name
 from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
@@ -22,6 +22,7 @@ def evaluate_pose(
     labels: Literal["unified", "original"] = "unified",
     setting: str = "anywhere",
     split: Literal["train", "test"] = "test",
+    assets: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     views: int = 32,
     jobs: int = CORES,
     json: bool = False,
@@ -33,10 +34,12 @@ def evaluate_pose(
 
     Args:
       name: A category, such as mug; or a type, axial, mirror or functional.
-      weights: File that manipose pose train wrote; pose/NAME/weights.npz without it.
+      weights: File that manipose pose train wrote; those of the package without it.
       labels: What the estimator was trained on.
-      setting: From where objects are seen: anywhere, resting, tasks, tasks-small, clean, occluded.
+      setting: From where objects are seen: anywhere, resting, tasks, clean, occluded, training.
       split: Of the catalogue.
+      assets: Evaluate on the assets in this folder that are of the category or type, such as real
+        scans, instead of the catalogue's.
       views: Of each object.
       jobs: Processes that render.
       json: Print JSON, for other programs.
@@ -44,34 +47,46 @@ def evaluate_pose(
     one_thread_per_process()
     if views < 1:
         raise InputError(f"--views is {views}; expected at least 1")
+    import numpy as np
     from rich.table import Table
 
     from manipose_mj.cli import output
     from manipose_mj.cli.pose_clouds import PoseClouds
+    from manipose_mj.ppf_jax.asset_views import asset_clouds
+    from manipose_mj.ppf_jax.estimator import PoseEstimator
     from manipose_mj.ppf_jax.evaluation import answers, catalogue_hulls
     from manipose_mj.ppf_jax.metrics import most_confident, pose_errors, summary
-    from manipose_mj.ppf_jax.weights import load_weights
+    from manipose_mj.ppf_jax.view_settings import view_setting
 
-    trained = load_weights(Path("pose") / name / WEIGHTS_FILE if weights is None else weights)
+    estimator = PoseEstimator.load(name) if weights is None else PoseEstimator.from_file(weights)
     rows = []
-    for category in PoseClouds(name).categories:
-        source = PoseClouds(category, jobs=jobs)
-        clouds = source.rendered(split, setting, views)
-        found = answers(trained.model, clouds)
-        frames = source.sources(clouds) if labels == "original" else None
-        errors = pose_errors(
-            found.poses, clouds, sources=frames, hulls=None if frames else catalogue_hulls(clouds)
-        )
+    categories = (name,) if assets is not None else PoseClouds(name).categories
+    for category in categories:
+        frames = hulls = None
+        if assets is not None:
+            if labels == "original":
+                raise InputError("--assets have unified labels only; leave out --labels original")
+            clouds = asset_clouds(assets, name, view_setting(setting), views=views, jobs=jobs)
+        else:
+            source = PoseClouds(category, jobs=jobs)
+            clouds = source.rendered(split, setting, views)
+            if labels == "original":
+                frames = source.sources(clouds)
+            else:
+                hulls = catalogue_hulls(clouds)
+        found = answers(estimator, clouds)
+        errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls)
         sure = summary(errors.of(most_confident(found.confidence, KEPT)))
+        figures = {k: v for k, v in summary(errors).items() if not np.isnan(v)}
         rows.append(
             {
                 "category": category,
                 "setting": setting,
                 "labels": labels,
-                **summary(errors),
+                **figures,
                 "confident_deg_mean": sure["deg_mean"],
                 "ms_per_object": found.ms_per_object,
-                "trained_on": category in trained.categories,
+                "trained_on": category in estimator.trained.categories,
             }
         )
     if json:

@@ -38,7 +38,7 @@ def train_pose(
     Args:
       name: A category, such as mug; or a type, axial, mirror or functional: one network for all of
         its categories.
-      out: Folder to write to; pose/NAME without it.
+      out: Folder to write to; pose/NAME, or pose/NAME-original, without it.
       leave_out: Categories of the type that are not trained on.
       labels: The unified labels, or those of the sources that the objects are assigned to.
       setting: From where objects are seen: training, anywhere, resting, tasks, clean, occluded.
@@ -68,7 +68,8 @@ def train_pose(
     clouds = source.rendered("train", setting, views)
     held_out = source.rendered("test", setting, 1 + CHECKS * batch // source.objects("test"))
     checks = batch_stream(held_out, batch, seed)(0)
-    folder = Path("pose") / name if out is None else out
+    suffix = "" if labels == "unified" else f"-{labels}"
+    folder = Path("pose") / f"{name}{suffix}" if out is None else out
     with output.Progress("steps") as progress:
 
         def show(row: Row) -> None:

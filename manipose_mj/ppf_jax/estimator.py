@@ -11,15 +11,16 @@ from typing import Protocol, TypeAlias
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
-from manipose_mj.ppf_jax.model import Estimates, PoseModel, estimate_batch, estimate_cloud
+from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
+from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, estimate_batch
 from manipose_mj.ppf_jax.weights import TrainedModel, load_weights
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
@@ -82,7 +83,7 @@ class PoseEstimator:
         if name not in CATALOGUE and name not in OBJECT_TYPES:
             raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
         stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
-        folder = Path(str(resources.files(__package__))) / "weights"
+        folder = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
         for stem in stems:
             if (folder / f"{stem}.npz").is_file():
                 return cls(_read_once(folder / f"{stem}.npz"))
@@ -112,7 +113,7 @@ class PoseEstimator:
         """
         points, normals = _checked(cloud, key)
         padded = _padded(points, normals, bucket(len(points)))
-        return _as_estimate(_estimate(self.trained.model, *padded, key=key))
+        return _as_estimate(_estimate(self.trained.model, *map(jnp.asarray, padded), key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -132,10 +133,9 @@ class PoseEstimator:
                 raise InputError(f"cloud {number}: {error}") from None
         size = bucket(max(len(points) for points, _ in checked))
         rows = [_padded(points, normals, size) for points, normals in checked]
-        points, normals, mask = (np.stack(column) for column in zip(*rows, strict=True))
-        found = estimate_batch(self.trained.model, points, normals, mask, key=key)
-        found = jax.tree.map(np.asarray, found)
-        return [_as_estimate(jax.tree.map(lambda leaf: leaf[i], found)) for i in range(len(rows))]
+        columns = (jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True))
+        found = jax.tree.map(np.asarray, estimate_batch(self.trained.model, *columns, key=key))
+        return [_as_estimate(_row(found, i)) for i in range(len(rows))]
 
 
 def bucket(count: int) -> int:
@@ -145,14 +145,14 @@ def bucket(count: int) -> int:
 
 @eqx.filter_jit
 def _estimate(
-    model: PoseModel,
-    points: Float[np.ndarray, "n 3"],
-    normals: Float[np.ndarray, "n 3"],
-    mask: np.ndarray,
+    model: EstimatingModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
     *,
     key: PRNGKeyArray,
 ) -> Estimates:
-    return estimate_cloud(model, points, normals, mask, key=key)
+    return model.estimate(points, normals, mask, key=key)
 
 
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,6 +201,10 @@ def _padded(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     room = ((0, size - len(points)), (0, 0))
     return np.pad(points, room), np.pad(normals, room), np.arange(size) < len(points)
+
+
+def _row(found: Estimates, index: int) -> Estimates:
+    return jax.tree.map(lambda leaf: leaf[index], found)
 
 
 def _as_estimate(found: Estimates) -> PoseEstimate:

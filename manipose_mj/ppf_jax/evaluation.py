@@ -1,4 +1,4 @@
-"""Running a trained model over a set of clouds."""
+"""Running an estimator over a set of clouds."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import ObjectType
 from manipose_mj.errors import unknown_name
 from manipose_mj.poses import invert, transform
-from manipose_mj.ppf_jax.clouds import MAX_POINTS, LabelledCloud, batch_clouds
-from manipose_mj.ppf_jax.model import PoseModel
-from manipose_mj.ppf_jax.training import estimate_batch
+from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.view_cache import catalogue_subject
 
 _TIMED = 20  # objects one by one
@@ -30,7 +29,7 @@ class Answers:
     Attributes:
       poses: `(n, 4, 4)`, `T_camera_label`.
       confidence: `(n,)`, higher is surer; NaN where a method has none.
-      ms_per_object: One object at a time, after compilation, on the machine at hand.
+      ms_per_object: Median of one object at a time, after compilation, on the machine at hand.
     """
 
     poses: Float[np.ndarray, "n 4 4"]
@@ -39,43 +38,41 @@ class Answers:
 
 
 def answers(
-    model: PoseModel, clouds: Sequence[LabelledCloud], *, batch: int = 32, seed: int = 0
+    estimator: PoseEstimator, clouds: Sequence[LabelledCloud], *, batch: int = 32, seed: int = 0
 ) -> Answers:
     """The likeliest hypothesis for every cloud.
 
     Args:
-      model: Trained.
+      estimator: Trained.
       clouds: At least one.
       batch: Clouds at the same time.
-      seed: Of the samples that the model draws; each cloud's depends on its place in the list.
+      seed: Of what the estimator draws; each cloud's share depends on its place in the list.
     """
-    poses, confidence = [], []
+    found = []
     for start in range(0, len(clouds), batch):
         some = list(clouds[start : start + batch])
-        padded = batch_clouds(
-            some + some[:1] * (batch - len(some)),
-            rng=np.random.default_rng(start),
-            points=MAX_POINTS,
-        )
+        # The last batch is filled up, so that all have one shape.
+        filled = some + [clouds[0]] * (batch - len(some))
         key = jax.random.fold_in(jax.random.key(seed), start)
-        found = estimate_batch(model, padded.points, padded.normals, padded.mask, key=key)
-        poses.append(np.asarray(found.poses[:, 0])[: len(some)])
-        confidence.append(np.asarray(found.confidence[:, 0])[: len(some)])
+        found += estimator.estimate_many(filled, key=key)[: len(some)]
     return Answers(
-        np.concatenate(poses), np.concatenate(confidence), _one_by_one(model, clouds[:_TIMED])
+        np.stack([each.pose for each in found]),
+        np.array([each.confidence for each in found]),
+        _one_by_one(estimator, clouds[:_TIMED]),
     )
 
 
-def _one_by_one(model: PoseModel, clouds: Sequence[LabelledCloud]) -> float:
-    """Median milliseconds for one object."""
-    key, spent = jax.random.key(0), []
-    for cloud in (clouds[0], *clouds):
-        single = batch_clouds([cloud], rng=np.random.default_rng(0), points=MAX_POINTS)
+def _one_by_one(estimator: PoseEstimator, clouds: Sequence[LabelledCloud]) -> float:
+    """Median milliseconds for one object's bare points, from which normals are estimated."""
+    key = jax.random.key(0)
+    for sized in {bucket(len(cloud)): cloud for cloud in clouds}.values():
+        estimator.estimate(sized.points, key=key)  # compiles
+    spent = []
+    for cloud in clouds:
         begin = time.perf_counter()
-        found = estimate_batch(model, single.points, single.normals, single.mask, key=key)
-        jax.block_until_ready(found.poses)
+        estimator.estimate(cloud.points, key=key)
         spent.append(time.perf_counter() - begin)
-    return 1e3 * float(np.median(spent[1:]))  # the first one compiles
+    return 1e3 * float(np.median(spent))
 
 
 def categories_of(name: str) -> tuple[str, ...]:

@@ -44,6 +44,12 @@ class LossConfig:
     turn: tuple[float, float] = (float(np.radians(0.3)), float(np.radians(40.0)))
     shift: tuple[float, float] = (0.005, 0.5)
 
+    def __call__(
+        self, model: PoseModel, sample: CloudBatch, *, key: PRNGKeyArray
+    ) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]]]:
+        """`cloud_loss` with this configuration."""
+        return cloud_loss(model, sample, self, key=key)
+
 
 def cloud_loss(
     model: PoseModel, sample: CloudBatch, config: LossConfig, *, key: PRNGKeyArray

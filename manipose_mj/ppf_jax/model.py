@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from manipose_mj.poses import compose
@@ -23,7 +25,6 @@ from manipose_mj.ppf_jax.refinement import (
 )
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import Hypotheses, VotingConfig, agreement, vote
-
 
 AT_ONCE = 128  # clouds whose votes are in memory together
 
@@ -49,6 +50,23 @@ class ModelConfig:
     points: int = SAMPLE_POINTS
 
 
+class EstimatingModel(Protocol):
+    """What turns clouds into poses: `PoseModel`, or a baseline. An `eqx.Module`."""
+
+    config: Any  # a frozen dataclass
+
+    def estimate(
+        self,
+        points: Float[Array, "n 3"],
+        normals: Float[Array, "n 3"],
+        mask: Bool[Array, "n"],
+        *,
+        key: PRNGKeyArray,
+    ) -> Estimates:
+        """The pose of the object that one cloud shows; arguments as of `estimate_cloud`."""
+        ...
+
+
 class PoseModel(eqx.Module):
     """The voting network and the refiner."""
 
@@ -56,11 +74,21 @@ class PoseModel(eqx.Module):
     refiner: Refiner
     config: ModelConfig = eqx.field(static=True)
 
-    def __init__(self, config: ModelConfig, *, key: PRNGKeyArray):
-        network_key, refiner_key = jax.random.split(key)
-        self.network = VotingNetwork(config.network, key=network_key)
-        self.refiner = Refiner(config.refinement, key=refiner_key)
+    def __init__(self, config: ModelConfig, *, rng: np.random.Generator):
+        self.network = VotingNetwork(config.network, rng=rng)
+        self.refiner = Refiner(config.refinement, rng=rng)
         self.config = config
+
+    def estimate(
+        self,
+        points: Float[Array, "n 3"],
+        normals: Float[Array, "n 3"],
+        mask: Bool[Array, "n"],
+        *,
+        key: PRNGKeyArray,
+    ) -> Estimates:
+        """`estimate_cloud` with this model."""
+        return estimate_cloud(self, points, normals, mask, key=key)
 
 
 class Estimates(eqx.Module):
@@ -125,19 +153,19 @@ def estimate_cloud(
 
 @eqx.filter_jit
 def estimate_batch(
-    model: PoseModel,
+    model: EstimatingModel,
     points: Float[Array, "b n 3"],
     normals: Float[Array, "b n 3"],
     mask: Bool[Array, "b n"],
     *,
     key: PRNGKeyArray,
 ) -> Estimates:
-    """`estimate_cloud` for every row of a batch, `AT_ONCE` at a time to bound the memory."""
+    """The estimates for every row of a batch, `AT_ONCE` at a time to bound the memory."""
     keys = jax.random.split(key, len(points))
     rows = (jnp.asarray(points), jnp.asarray(normals), jnp.asarray(mask), keys)
 
     def one(row: tuple[Array, ...]) -> Estimates:
-        return estimate_cloud(model, *row[:3], key=row[3])
+        return model.estimate(*row[:3], key=row[3])
 
     if len(points) <= AT_ONCE:
         return jax.vmap(one)(rows)

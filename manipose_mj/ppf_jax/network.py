@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+import numpy as np
+from jaxtyping import Array, Float, Int
 
 from manipose_mj.ppf_jax.features import (
     PAIR_FEATURES,
@@ -42,13 +43,14 @@ class NetworkConfig:
 
 
 class Dense(eqx.Module):
-    """An affine map of the last axis."""
+    """An affine map of the last axis; NumPy draws the weights, the same for every device."""
 
     weight: Float[Array, "inputs outputs"]
     bias: Float[Array, "outputs"]
 
-    def __init__(self, inputs: int, outputs: int, *, key: PRNGKeyArray, gain: float = 2.0):
-        self.weight = jax.random.normal(key, (inputs, outputs)) * (gain / inputs) ** 0.5
+    def __init__(self, inputs: int, outputs: int, *, rng: np.random.Generator, gain: float = 2.0):
+        scale = (gain / inputs) ** 0.5
+        self.weight = jnp.asarray(scale * rng.normal(size=(inputs, outputs)), jnp.float32)
         self.bias = jnp.zeros(outputs)
 
     def __call__(self, x: Float[Array, "*b inputs"]) -> Float[Array, "*b outputs"]:
@@ -80,12 +82,11 @@ class AnchorLayer(eqx.Module):
     of_pair: Dense
     merge: Dense
 
-    def __init__(self, inputs: int, width: int, *, key: PRNGKeyArray):
-        keys = jax.random.split(key, 4)
-        self.of_point = Dense(inputs, width, key=keys[0], gain=0.7)
-        self.of_anchor = Dense(inputs, width, key=keys[1], gain=0.7)
-        self.of_pair = Dense(PAIR_FEATURES, width, key=keys[2], gain=0.7)
-        self.merge = Dense(inputs + 2 * width, width, key=keys[3])
+    def __init__(self, inputs: int, width: int, *, rng: np.random.Generator):
+        self.of_point = Dense(inputs, width, rng=rng, gain=0.7)
+        self.of_anchor = Dense(inputs, width, rng=rng, gain=0.7)
+        self.of_pair = Dense(PAIR_FEATURES, width, rng=rng, gain=0.7)
+        self.merge = Dense(inputs + 2 * width, width, rng=rng)
 
     def __call__(
         self,
@@ -122,27 +123,26 @@ class VotingNetwork(eqx.Module):
     size: Dense
     config: NetworkConfig = eqx.field(static=True)
 
-    def __init__(self, config: NetworkConfig, *, key: PRNGKeyArray):
-        keys = iter(jax.random.split(key, 12 + config.pair_layers))
+    def __init__(self, config: NetworkConfig, *, rng: np.random.Generator):
         width, pair = config.width, config.pair_width
         self.config = config
-        self.edge = Dense(PAIR_FEATURES, config.local_width, key=next(keys))
-        self.local = Dense(config.local_width, config.local_width, key=next(keys))
+        self.edge = Dense(PAIR_FEATURES, config.local_width, rng=rng)
+        self.local = Dense(config.local_width, config.local_width, rng=rng)
         self.anchor_layers = (
-            AnchorLayer(config.local_width, width, key=next(keys)),
-            AnchorLayer(width, width, key=next(keys)),
+            AnchorLayer(config.local_width, width, rng=rng),
+            AnchorLayer(width, width, rng=rng),
         )
-        self.to_global = Dense(width, 2 * width, key=next(keys))
-        self.of_first = Dense(width, pair, key=next(keys), gain=0.5)
-        self.of_second = Dense(width, pair, key=next(keys), gain=0.5)
-        self.of_pair = Dense(PAIR_FEATURES, pair, key=next(keys), gain=0.5)
-        self.of_global = Dense(2 * width + 1, pair, key=next(keys), gain=0.5)
+        self.to_global = Dense(width, 2 * width, rng=rng)
+        self.of_first = Dense(width, pair, rng=rng, gain=0.5)
+        self.of_second = Dense(width, pair, rng=rng, gain=0.5)
+        self.of_pair = Dense(PAIR_FEATURES, pair, rng=rng, gain=0.5)
+        self.of_global = Dense(2 * width + 1, pair, rng=rng, gain=0.5)
         self.pair_layers = tuple(
-            Dense(pair, pair, key=next(keys), gain=0.5) for _ in range(config.pair_layers)
+            Dense(pair, pair, rng=rng, gain=0.5) for _ in range(config.pair_layers)
         )
-        self.votes = Dense(pair, 2 * PAIR_OUTPUTS, key=next(keys), gain=0.1)
-        self.size_hidden = Dense(2 * width + 1, width, key=next(keys))
-        self.size = Dense(width, 3, key=next(keys), gain=0.1)
+        self.votes = Dense(pair, 2 * PAIR_OUTPUTS, rng=rng, gain=0.1)
+        self.size_hidden = Dense(2 * width + 1, width, rng=rng)
+        self.size = Dense(width, 3, rng=rng, gain=0.1)
 
     def encode(self, cloud: Cloud) -> tuple[Float[Array, "n width"], Float[Array, "context"]]:
         """Features of every point and of the whole cloud, its metric size included."""

@@ -74,6 +74,12 @@ def rasterise(
     return _draw(np.concatenate(corners), np.concatenate(owner), intrinsics)
 
 
+def pixel_rays(intrinsics: Intrinsics) -> Float[np.ndarray, "height width 3"]:
+    """The ray through each pixel's centre, camera frame, with z = 1."""
+    slopes = intrinsics.slopes()
+    return np.concatenate([slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
+
+
 def _facing(corners: Float[np.ndarray, "f 3 3"]) -> np.ndarray:
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.einsum("fi,fi->f", np.cross(b - a, c - a), a) < 0

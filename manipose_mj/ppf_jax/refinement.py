@@ -80,18 +80,17 @@ class Refiner(eqx.Module):
     judge: Dense
     config: RefinementConfig = eqx.field(static=True)
 
-    def __init__(self, config: RefinementConfig, *, key: PRNGKeyArray):
-        keys = jax.random.split(key, 7)
+    def __init__(self, config: RefinementConfig, *, rng: np.random.Generator):
         low, high = config.widths
-        pooled, known = 2 * high + config.hidden, 4 + PAIR_OUTPUTS
+        pooled, known = 3 * high + config.hidden, 4 + PAIR_OUTPUTS
         self.config = config
-        self.first = Dense(_INPUTS, low, key=keys[0])
-        self.second = Dense(low, high, key=keys[1])
-        self.of_cloud = Dense(known, config.hidden, key=keys[2])
-        self.correct_hidden = Dense(pooled, config.hidden, key=keys[3])
-        self.correct = Dense(config.hidden, 9, key=keys[4], gain=0.01)
-        self.judge_hidden = Dense(pooled, config.hidden, key=keys[5])
-        self.judge = Dense(config.hidden, len(LEVELS), key=keys[6], gain=0.01)
+        self.first = Dense(_INPUTS, low, rng=rng)
+        self.second = Dense(low, high, rng=rng)
+        self.of_cloud = Dense(known, config.hidden, rng=rng)
+        self.correct_hidden = Dense(pooled, config.hidden, rng=rng)
+        self.correct = Dense(config.hidden, 9, rng=rng, gain=0.01)
+        self.judge_hidden = Dense(pooled, config.hidden, rng=rng)
+        self.judge = Dense(config.hidden, len(LEVELS), rng=rng, gain=0.01)
 
     def __call__(
         self,
@@ -124,7 +123,8 @@ class Refiner(eqx.Module):
         about = self.of_cloud(jnp.concatenate([size, log_extents, agreement]))
         pooled = jnp.concatenate(
             [
-                jnp.maximum(jnp.max(seen, axis=0), jnp.max(through, axis=0)),
+                jnp.max(seen, axis=0),
+                jnp.max(through, axis=0),
                 jnp.sum(seen, axis=0) / jnp.maximum(cloud.count, 1),
                 jax.nn.relu(about),
             ]

@@ -18,17 +18,16 @@ from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.depth_noise import KINECT, structured_light
 from manipose_mj.mjcf.ray_camera import Intrinsics
-from manipose_mj.poses import compose, transform
+from manipose_mj.poses import transform
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, LabelledCloud
 from manipose_mj.ppf_jax.depth_normals import depth_normals
-from manipose_mj.ppf_jax.rasteriser import Raster, Triangles, rasterise
+from manipose_mj.ppf_jax.occlusion import Occluder, nearer, occluded
+from manipose_mj.ppf_jax.rasteriser import Raster, Triangles, pixel_rays, rasterise
 from manipose_mj.ppf_jax.view_settings import Placement, ViewSetting, place
 
 MIN_POINTS = 32  # a view with fewer is drawn anew: nobody can say anything about it
 MARGIN = 10  # around the object, for what bleeds into its outline [pixels]
-LEFT_OVER = (0.3, 0.9)  # share of its pixels that something in front leaves of an object
-_DRAWS, _OCCLUDER_DRAWS = 40, 6
-_LEAST_DISTANCE = 0.25  # of something in front from the camera [m]
+_DRAWS = 40
 
 
 @dataclass(frozen=True)
@@ -67,30 +66,6 @@ class Subject:
         """The subject with this surface."""
         bounds, hull = np.asarray(mesh.bounds, float), np.asarray(mesh.convex_hull.vertices)
         return cls(name, category, label, Triangles.of_mesh(mesh), bounds, hull, tuple(rests))
-
-
-@dataclass(frozen=True)
-class Occluder:
-    """Something to put in front.
-
-    Attributes:
-      triangles: About the centre of its bounding box, which has a half diagonal of 1.
-    """
-
-    triangles: Triangles
-
-    @classmethod
-    def of_mesh(cls, mesh: trimesh.Trimesh) -> Occluder:
-        """Any mesh, moved and scaled."""
-        bounds = np.asarray(mesh.bounds)
-        radius = 0.5 * np.linalg.norm(bounds[1] - bounds[0])
-        own = Triangles.of_mesh(mesh)
-        return cls(replace(own, corners=(own.corners - bounds.mean(axis=0)) / radius))
-
-    @classmethod
-    def random_box(cls, rng: np.random.Generator) -> Occluder:
-        """A box with edges of any proportion up to 1 : 5."""
-        return cls.of_mesh(trimesh.creation.box(extents=rng.uniform(0.2, 1.0, 3)))
 
 
 @dataclass(frozen=True)
@@ -147,7 +122,8 @@ def render_clouds(
         else:
             raise InputError(
                 f"{subject.name}: {_DRAWS} views of setting {setting.name!r} in a row show fewer than "
-                f"{MIN_POINTS} points; is it in metres? Its box is {np.ptp(subject.bounds, axis=0)} m"
+                f"{MIN_POINTS} points; is it in metres, and are {min(setting.image_heights)} rows enough? "
+                f"Its box is {np.ptp(subject.bounds, axis=0)} m"
             )
     return clouds
 
@@ -166,12 +142,12 @@ def render_view(
     window = _window(subject, placement)
     drawn = rasterise([(subject.triangles, placement.T_camera_mesh)], window)
     if rng.random() < setting.occluded:
-        drawn = _occluded(drawn, radius, window, rng, occluders)
+        drawn = occluded(drawn, radius, window, rng, occluders)
     drawn = _grounded(drawn, placement, window)
     mask = _bled(drawn.item == 0, setting.bleed * window.fx / KINECT.focal, rng)
     depth = drawn.depth
     if setting.sensor is not None:
-        rays = _rays(window)
+        rays = pixel_rays(window)
         cosine = -np.einsum("hwi,hwi->hw", drawn.normal, rays) / np.linalg.norm(rays, axis=-1)
         depth = structured_light(depth, cosine, window, rng, setting.sensor)
     return View(depth, mask, drawn, window, placement.T_camera_mesh)
@@ -184,7 +160,7 @@ def cloud_of_view(
     pixels = np.argwhere(view.mask & (view.depth > 0))
     pixels = pixels[rng.permutation(len(pixels))[:MAX_POINTS]]
     normals = depth_normals(view.depth, view.mask, pixels, view.intrinsics)
-    rays = _rays(view.intrinsics)[pixels[:, 0], pixels[:, 1]]
+    rays = pixel_rays(view.intrinsics)[pixels[:, 0], pixels[:, 1]]
     points = rays * view.depth[pixels[:, 0], pixels[:, 1]][:, None]
     return points.astype(np.float32), normals.astype(np.float32)
 
@@ -209,11 +185,6 @@ def _cloud(
     )
 
 
-def _rays(intrinsics: Intrinsics) -> Float[np.ndarray, "height width 3"]:
-    slopes = intrinsics.slopes()
-    return np.concatenate([slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
-
-
 def _window(subject: Subject, placement: Placement) -> Intrinsics:
     """The part of the image that can show the object, at least a pixel."""
     k, placed = placement.intrinsics, transform(placement.T_camera_mesh, subject.hull)
@@ -226,60 +197,18 @@ def _window(subject: Subject, placement: Placement) -> Intrinsics:
     return replace(k, width=right - left, height=bottom - top, cx=k.cx - left, cy=k.cy - top)
 
 
-def _occluded(
-    drawn: Raster,
-    radius: float,
-    window: Intrinsics,
-    rng: np.random.Generator,
-    occluders: Sequence[Occluder],
-) -> Raster:
-    """The same with something in front of a part, if a few draws find a place for it."""
-    pixels = np.argwhere(drawn.item == 0)
-    if not len(pixels):
-        return drawn
-    rays, nearest = _rays(window), drawn.depth[drawn.item == 0].min()
-    for _ in range(_OCCLUDER_DRAWS):
-        kind = int(rng.integers(len(occluders) + 1))
-        occluder = occluders[kind - 1] if kind else Occluder.random_box(rng)
-        size = radius * rng.uniform(0.3, 0.8)
-        depth = min(nearest - size, nearest * rng.uniform(0.6, 0.95))
-        if depth - size < _LEAST_DISTANCE:
-            continue
-        row, column = pixels[rng.integers(len(pixels))]
-        position = rays[row, column] * depth
-        position[:2] += rng.normal(0.0, 0.4 * size, 2)
-        rotation = _random_rotation(rng)
-        pose = compose(size * rotation, position)
-        front = rasterise([(occluder.triangles, pose)], window)
-        merged = _nearer(drawn, replace(front, item=np.where(front.item == 0, 1, front.item)))
-        left = np.count_nonzero(merged.item == 0) / len(pixels)
-        if LEFT_OVER[0] < left < LEFT_OVER[1]:
-            return merged
-    return drawn
-
-
-def _nearer(first: Raster, second: Raster) -> Raster:
-    """The nearer of two images in every pixel."""
-    there = (second.depth > 0) & ((first.depth == 0) | (second.depth < first.depth))
-    return Raster(
-        np.where(there, second.depth, first.depth),
-        np.where(there, second.item, first.item),
-        np.where(there[..., None], second.normal, first.normal),
-    )
-
-
 def _grounded(drawn: Raster, placement: Placement, window: Intrinsics) -> Raster:
     """The same before the placement's plane, as item 2."""
     if placement.ground is None:
         return drawn
     point, normal = placement.ground
-    along = _rays(window) @ normal
+    along = pixel_rays(window) @ normal
     reached = along < -1e-6
     depth = np.where(reached, (point @ normal) / np.where(reached, along, -1.0), 0.0)
     shape = drawn.depth.shape
     plane = Raster(depth, np.full(shape, 2, np.int32), np.broadcast_to(normal, (*shape, 3)))
     # What touches the plane lies a rounding error beneath it.
-    return _nearer(replace(plane, depth=plane.depth * (1 + 1e-6)), drawn)
+    return nearer(replace(plane, depth=plane.depth * (1 + 1e-6)), drawn)
 
 
 def _bled(
@@ -294,7 +223,3 @@ def _bled(
     field = zoom(coarse, scale, order=1)[: mask.shape[0], : mask.shape[1]]
     # The blurred step passes its value at one deviation beside the edge, 0.34 from the half.
     return soft > np.clip(0.5 + 0.34 * field, 0.02, 0.98)
-
-
-def _random_rotation(rng: np.random.Generator) -> Float[np.ndarray, "3 3"]:
-    return trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]

@@ -9,22 +9,22 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from manipose_mj.errors import InputError
+from manipose_mj.poses import rotation_angle
 from manipose_mj.ppf_jax.clouds import CloudBatch
-from manipose_mj.ppf_jax.losses import LossConfig, cloud_loss
-from manipose_mj.ppf_jax.model import Estimates, ModelConfig, PoseModel, estimate_batch
+from manipose_mj.ppf_jax.losses import LossConfig
+from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, PoseModel, estimate_batch
 from manipose_mj.ppf_jax.symmetry import nearest_equivalent
 from manipose_mj.ppf_jax.weights import replacing
-from manipose_mj.poses import rotation_angle
 
 log = logging.getLogger(__name__)
 
@@ -32,6 +32,16 @@ STATE_FILE, CURVE_FILE = "state.eqx", "curve.json"
 # Batches from step `start` on, so that a resumed training sees what an unbroken one would have.
 Batches = Callable[[int], Iterator[CloudBatch]]
 Row = dict[str, float]
+
+
+class Objective(Protocol):
+    """The loss of one row of a batch, and its parts; hashable, for it is compiled in."""
+
+    def __call__(
+        self, model: Any, sample: CloudBatch, *, key: PRNGKeyArray
+    ) -> tuple[Float[Array, ""], dict[str, Float[Array, ""]]]:
+        """Both, for a model; `key` for what is drawn."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -57,7 +67,7 @@ class TrainingConfig:
     cooldown: float = 0.5
     weight_decay: float = 1e-4
     seed: int = 0
-    loss: LossConfig = field(default_factory=LossConfig)
+    loss: Objective = field(default_factory=LossConfig)
     log_every: int = 50
     evaluate_every: int = 1000
     save_every: float = 60.0
@@ -66,21 +76,22 @@ class TrainingConfig:
 class TrainingState(eqx.Module):
     """All that a step changes."""
 
-    model: PoseModel
+    model: Any
     optimizer: optax.OptState
     step: Array
 
 
 def train(
     batches: Batches,
-    model_config: ModelConfig,
+    model_config: Any,
     config: TrainingConfig,
     folder: Path,
     *,
+    build: Callable[..., Any] = PoseModel,
     held_out: Sequence[CloudBatch] = (),
     minutes: float | None = None,
     progress: Callable[[Row], None] | None = None,
-) -> PoseModel:
+) -> Any:
     """Train a model, or go on with one whose state the folder holds.
 
     The same seed and batches give the same curve on one CPU, unless `minutes` ends it. All devices
@@ -91,6 +102,7 @@ def train(
       model_config: What to train.
       config: How.
       folder: Where the state and the curve are kept.
+      build: Makes the model from `model_config` and `rng`, its random numbers.
       held_out: Batches to measure on, of one shape.
       minutes: Ends the training, cooled down, if the steps do not.
       progress: Told every row of the curve.
@@ -99,7 +111,9 @@ def train(
       InputError: The folder holds another training's state.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    state, curve = _resumed(folder, model_config, config)
+    state, curve = _resumed(
+        folder, build(model_config, rng=np.random.default_rng(config.seed)), config
+    )
     start = int(state.step)
     began = saved = time.monotonic()
     earlier = float(curve[-1]["seconds"]) if curve else 0.0
@@ -144,7 +158,7 @@ def learning_rate(config: TrainingConfig, step: int, share: float) -> float:
     return config.learning_rate * min(1.0, (step + 1) / config.warmup) * max(fall, 1e-3)
 
 
-def evaluate(model: PoseModel, batches: Sequence[CloudBatch]) -> Row:
+def evaluate(model: EstimatingModel, batches: Sequence[CloudBatch]) -> Row:
     """Errors of the best hypothesis before and after refinement, and of the best there is.
 
     Returns:
@@ -209,13 +223,13 @@ def _step(
     key = jax.random.fold_in(jax.random.key(config.seed), state.step)
     keys = jax.random.split(key, batch.points.shape[0])
 
-    def loss(model: PoseModel) -> tuple[Array, dict[str, Array]]:
-        losses, parts = jax.vmap(lambda s, k: cloud_loss(model, s, config.loss, key=k))(batch, keys)
+    def loss(model: Any) -> tuple[Array, dict[str, Array]]:
+        losses, parts = jax.vmap(lambda s, k: config.loss(model, s, key=k))(batch, keys)
         return jnp.mean(losses), jax.tree.map(jnp.mean, parts)
 
     (total, parts), gradient = eqx.filter_value_and_grad(loss, has_aux=True)(state.model)
     # One batch with a gradient that is no number must not end a training.
-    sound = jnp.isfinite(optax.global_norm(gradient))
+    sound = jnp.isfinite(optax.tree.norm(gradient))
     gradient = jax.tree.map(lambda g: jnp.where(sound, g, 0.0), gradient)
     updates, optimizer = _optimizer(config).update(
         gradient, state.optimizer, eqx.filter(state.model, eqx.is_array)
@@ -238,16 +252,13 @@ def _placement() -> Callable[[CloudBatch], CloudBatch]:
     return place
 
 
-def _fresh(model_config: ModelConfig, config: TrainingConfig) -> TrainingState:
-    model = PoseModel(model_config, key=jax.random.key(config.seed))
+def _fresh(model: Any, config: TrainingConfig) -> TrainingState:
     optimizer = _optimizer(config).init(eqx.filter(model, eqx.is_array))
     return TrainingState(model, optimizer, jnp.zeros((), jnp.int32))
 
 
-def _resumed(
-    folder: Path, model_config: ModelConfig, config: TrainingConfig
-) -> tuple[TrainingState, list[Row]]:
-    fresh = _fresh(model_config, config)
+def _resumed(folder: Path, model: Any, config: TrainingConfig) -> tuple[TrainingState, list[Row]]:
+    fresh = _fresh(model, config)
     path = folder / STATE_FILE
     if not path.is_file():
         return fresh, []
@@ -265,7 +276,7 @@ def _resumed(
         raise InputError(f"{path}: not a whole training state ({error}); remove it") from None
 
 
-def _described(model_config: ModelConfig, config: TrainingConfig) -> Any:
+def _described(model_config: Any, config: TrainingConfig) -> Any:
     parts = (dataclasses.asdict(model_config), dataclasses.asdict(config))
     # As it reads back: JSON has no tuples.
     return json.loads(json.dumps(parts))

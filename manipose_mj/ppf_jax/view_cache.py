@@ -31,7 +31,8 @@ from manipose_mj.ppf_jax.clouds import (
     batch_clouds,
     most_turns,
 )
-from manipose_mj.ppf_jax.rendering import Occluder, Subject, render_clouds
+from manipose_mj.ppf_jax.occlusion import Occluder
+from manipose_mj.ppf_jax.rendering import Subject, render_clouds
 from manipose_mj.ppf_jax.source_frames import SourceLabel, label_bounds, source_label
 from manipose_mj.ppf_jax.view_settings import ViewSetting
 

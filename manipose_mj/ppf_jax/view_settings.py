@@ -50,8 +50,6 @@ SETTINGS: dict[str, ViewSetting] = {
         _ANYWHERE,
         ViewSetting("resting", "resting"),
         ViewSetting("tasks", "tasks"),
-        # As above at the image size that tasks have by default.
-        ViewSetting("tasks-small", "tasks", image_heights=(120,)),
         replace(_ANYWHERE, name="occluded", occluded=1.0),
         replace(_ANYWHERE, name="clean", bleed=0.0, sensor=None),
         # What networks learn from: every distance and image size that the others have, and more hidden.

@@ -186,8 +186,8 @@ def _turns_about(
 ) -> Float[Array, "turns 3"]:
     """The peaks of Y about a given X."""
     first = _any_perpendicular(x)
-    angles = np.arange(config.turns) * (2 * np.pi / config.turns)
-    circle = np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * jnp.cross(x, first)
+    angles = jnp.arange(config.turns)[:, None] * (2 * np.pi / config.turns)
+    circle = jnp.cos(angles) * first + jnp.sin(angles) * jnp.cross(x, first)
     scores = _direction_scores(few, circle, symmetry.unsigned_y)
     starts = _peaks(scores, circle, config.turns_kept, config.separation, symmetry.unsigned_y)
 

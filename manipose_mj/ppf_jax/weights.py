@@ -7,17 +7,20 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from manipose_mj.errors import InputError
-from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
+from manipose_mj.ppf_jax.cppf import CppfModel
+from manipose_mj.ppf_jax.cppf_voting import CppfConfig
+from manipose_mj.ppf_jax.model import EstimatingModel, ModelConfig, PoseModel
 from manipose_mj.ppf_jax.network import NetworkConfig
 from manipose_mj.ppf_jax.refinement import RefinementConfig
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
@@ -36,7 +39,7 @@ class TrainedModel:
       categories: Of the objects it was trained on.
     """
 
-    model: PoseModel
+    model: EstimatingModel
     categories: tuple[str, ...]
 
 
@@ -45,10 +48,13 @@ def save_weights(path: Path, trained: TrainedModel) -> None:
     header = {
         "format": FORMAT_VERSION,
         "categories": trained.categories,
+        "kind": _kind(trained.model),
         "config": dataclasses.asdict(trained.model.config),
     }
-    leaves = jax.tree.leaves(eqx.filter(trained.model, eqx.is_array))
-    arrays = {f"leaf_{i:03d}": np.asarray(leaf, np.float16) for i, leaf in enumerate(leaves)}
+    leaves = jax.tree.leaves(trained.model)
+    arrays: dict[str, Any] = {
+        f"leaf_{i:03d}": np.asarray(leaf, np.float16) for i, leaf in enumerate(leaves)
+    }
     arrays[_HEADER] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as scratch, open(scratch, "wb") as file:
@@ -67,7 +73,7 @@ def load_weights(path: Path) -> TrainedModel:
             arrays = [stored[name] for name in sorted(stored.files) if name != _HEADER]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file of weights") from None
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zipfile.zlib.error):  # pyright: ignore[reportAttributeAccessIssue]
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error):
         raise InputError(
             f"{path}: not a whole file of weights; copy it again or train anew"
         ) from None
@@ -77,9 +83,9 @@ def load_weights(path: Path) -> TrainedModel:
             f"{FORMAT_VERSION}: train anew or install the version that wrote them"
         )
     try:
-        config = _config(header["config"])
-        blank = eqx.filter_eval_shape(PoseModel, config, key=jax.random.key(0))
-        shapes, structure = jax.tree.flatten(eqx.filter(blank, eqx.is_array_like))
+        build, configured = _KINDS[header["kind"]]
+        blank = build(configured(header["config"]), rng=np.random.default_rng(0))
+        shapes, structure = jax.tree.flatten(blank)
         if [leaf.shape for leaf in shapes] != [array.shape for array in arrays]:
             raise ValueError("shapes")
         categories = tuple(header["categories"])
@@ -110,14 +116,31 @@ class replacing:  # noqa: N801
             self._scratch.unlink(missing_ok=True)
 
 
-def _config(stored: dict[str, Any]) -> ModelConfig:
-    refinement = dict(stored["refinement"])
-    refinement["widths"] = tuple(refinement["widths"])
+def _model_config(stored: dict[str, Any]) -> ModelConfig:
     return ModelConfig(
         symmetry=CommonSymmetry(**stored["symmetry"]),
         network=NetworkConfig(**stored["network"]),
         voting=VotingConfig(**stored["voting"]),
-        refinement=RefinementConfig(**refinement),
+        refinement=RefinementConfig(**_tuples(stored["refinement"])),
         pairs=stored["pairs"],
         points=stored["points"],
     )
+
+
+def _cppf_config(stored: dict[str, Any]) -> CppfConfig:
+    return CppfConfig(**_tuples(stored | {"symmetry": CommonSymmetry(**stored["symmetry"])}))
+
+
+def _tuples(stored: dict[str, Any]) -> dict[str, Any]:
+    """JSON's lists as the tuples they were."""
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in stored.items()}
+
+
+_KINDS: dict[str, tuple[Callable[..., Any], Callable[[dict[str, Any]], Any]]] = {
+    "ours": (PoseModel, _model_config),
+    "cppf": (CppfModel, _cppf_config),
+}
+
+
+def _kind(model: EstimatingModel) -> str:
+    return next(kind for kind, (build, _) in _KINDS.items() if isinstance(model, build))  # pyright: ignore[reportArgumentType]

@@ -82,7 +82,6 @@ def test_nothing_touches_anywhere_in_the_ranges(category, index, tmp_path):
 def test_parts_open_by_their_handles_and_shut_again(category, index, tmp_path):
     specimen = made(category, index)
     model = on_table(specimen, tmp_path)
-    model.opt.timestep = 0.004
     for part in specimen.parts[:3]:
         data = mujoco.MjData(model)
         while data.time < 2.0:

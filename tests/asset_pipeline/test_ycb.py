@@ -80,14 +80,14 @@ def test_symmetry_is_what_the_shape_has(assets):
     assert len(sugar.rotations) == 4 and not sugar.axial
     assert len(mustard.rotations) == 2 and not mustard.axial  # oval: no body of revolution
     np.testing.assert_allclose(mustard.rotations[1], np.diag([1.0, -1.0, -1.0]), atol=1e-6)
-    assert len(driver.rotations) == 1
+    assert len(driver.rotations) == 2  # its handle is flattened on two sides
 
 
 @needs_data
 def test_assets_rest_and_can_be_grasped(assets):
     for result in check(assets[BUILT[0]].folder.parent):
         assert result.ok, result.failures
-        assert result.part_vertices <= 64 and result.parts <= 32
+        assert result.part_vertices <= 32 and result.parts <= 32
         assert result.grasps >= 50
     assert assets["006_mustard_bottle"].mass_properties.mass == pytest.approx(0.603)
 

@@ -166,7 +166,7 @@ def _case(m: Microwave) -> Case:
         high=np.array([x, y, z + m.height]),
         inner_low=np.array([-x, inner[0], z + m.floor]),
         inner_high=np.array([x - m.back, inner[1], z + m.height - m.ceiling]),
-        corner=0.008,
+        corner=0.006,
         rgba=m.case_rgba,
         lining=m.lining,
     )

@@ -104,8 +104,8 @@ def _built_in(rng: np.random.Generator, metal: Colour) -> dict:
 
 
 def _pull(rng: np.random.Generator, length: float, standoff: float, metal: Colour) -> Handle:
-    """A bar, or a flat bow, for one in three."""
+    """A bar or, nearly as often, a flat bow."""
     off = standoff, standoff + 0.003
-    if rng.random() < 0.33:
+    if rng.random() < 0.45:
         return bow((length, length), standoff=off, power=(5.0, 7.0))(rng, metal)
     return bar((length, length), thickness=(0.011, 0.013), standoff=off)(rng, metal)

@@ -31,7 +31,7 @@ def turntable(floor: Float[np.ndarray, "3"], diameter: float) -> tuple[list[Shap
         (0.0, 0.0),
         (HUB, 0.0),
         (HUB, TOP - THICKNESS),
-        (radius - RIM_WIDTH, TOP - THICKNESS),
+        (radius - RIM_WIDTH / 4, TOP - THICKNESS),
         (radius, TOP + RIM),
         (radius - RIM_WIDTH, TOP + RIM),
         (radius - 2 * RIM_WIDTH, TOP),

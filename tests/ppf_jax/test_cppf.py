@@ -1,0 +1,97 @@
+"""CPPF's baseline: votes that know the truth give it back to the grid's precision; its losses fall."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from half_visible import half_visible_clouds
+
+from manipose_mj.ppf_jax.clouds import batch_clouds
+from manipose_mj.ppf_jax.cppf import CppfLoss, CppfModel, cppf_config
+from manipose_mj.ppf_jax.cppf_voting import CppfOutputs, directed, towards, voted_estimate
+from manipose_mj.ppf_jax.training import CURVE_FILE, TrainingConfig, train
+from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
+
+PAIRS = 3000
+
+
+@pytest.fixture(scope="module")
+def mugs():
+    return half_visible_clouds("mug", [0], 4, points=200)
+
+
+@pytest.fixture(scope="module")
+def config(mugs):
+    small = dataclasses.replace(cppf_config(mugs), pairs=PAIRS, cone_pairs=1000, neighbours=20)
+    return dataclasses.replace(small, center_bins=128, angle_bins=128)
+
+
+def _sure(value, longest, bins):
+    """Logits that leave no doubt about the bin that a value is in."""
+    bin_ = jnp.round(jnp.clip(value / longest, 0, 1) * (bins - 1)).astype(int)
+    return 50.0 * jax.nn.one_hot(bin_, bins)
+
+
+def test_the_settings_cover_the_objects(mugs, config):
+    far = max(np.linalg.norm(c.points - c.pose[:3, 3], axis=1).max() for c in mugs)
+    assert config.reach[0] == pytest.approx(far, abs=1e-3)
+    assert np.allclose(np.exp(config.mean_log_extents), mugs[0].extents, rtol=1e-3)
+    assert not config.symmetry.axial
+
+
+def test_votes_that_know_the_truth_give_it_back(mugs, config):
+    """The centre to a cell or two, each axis to the spacing of the directions."""
+    cloud = mugs[0]
+    middle = cloud.points.mean(axis=0)
+    points, normals = jnp.asarray(cloud.points - middle), jnp.asarray(cloud.normals)
+    rng = np.random.default_rng(0)
+    first, second = (jnp.asarray(r) for r in rng.integers(0, len(points), (2, PAIRS)))
+    along, _ = directed(points, first, second)
+    offset = points[first] - (cloud.pose[:3, 3] - middle)
+    mu = jnp.sum(offset * along, axis=1)
+    nu = jnp.linalg.norm(offset - mu[:, None] * along, axis=1)
+    angles = jnp.arccos(jnp.clip(along @ cloud.pose[:3, :2], -1, 1))
+    facing = towards(normals[first], along)
+    out = CppfOutputs(
+        mu=_sure(mu + config.reach[0], 2 * config.reach[0], config.center_bins),
+        nu=_sure(nu, config.reach[1], config.center_bins),
+        angles=_sure(angles, np.pi, config.angle_bins),
+        signs=10.0 * jnp.sign(facing @ cloud.pose[:3, :2]),
+        log_extents=jnp.zeros((PAIRS, 3)),
+    )
+    mask = jnp.ones(len(points), bool)
+    found = jax.jit(lambda *a: voted_estimate(*a, config, key=jax.random.key(0)))(
+        out, points, normals, mask, first, second
+    )
+    pose = np.asarray(found.poses[0])
+    assert np.linalg.norm(pose[:3, 3] + middle - cloud.pose[:3, 3]) < 2 * config.cell
+    degrees = np.degrees(np.arccos(np.sum(pose[:3, :2] * cloud.pose[:3, :2], axis=0)))
+    assert np.all(degrees < 12)
+    assert np.allclose(found.extents[0], cloud.extents, rtol=1e-3)
+    assert float(found.confidence[0]) > 0.8
+
+
+def test_it_trains_estimates_and_is_kept(mugs, config, tmp_path):
+    def batches(start):
+        while True:
+            yield batch_clouds(mugs, rng=np.random.default_rng(0), points=128)
+
+    training = TrainingConfig(steps=30, warmup=2, log_every=1, loss=CppfLoss(pairs=200))
+    model = train(batches, config, training, tmp_path, build=CppfModel)
+    curve = json.loads((tmp_path / CURVE_FILE).read_text())
+    for part in ("mu", "nu", "x", "y"):
+        assert np.mean([r[part] for r in curve[-3:]]) < np.mean([r[part] for r in curve[:3]]), part
+    save_weights(tmp_path / "cppf.npz", TrainedModel(model, ("mug",)))
+    back = load_weights(tmp_path / "cppf.npz").model
+    assert back.config == config
+    batch = next(batches(0))
+    found = back.estimate(
+        *(jnp.asarray(v[0]) for v in (batch.points, batch.normals, batch.mask)),
+        key=jax.random.key(0),
+    )
+    assert found.poses.shape == (1, 4, 4) and bool(jnp.all(jnp.isfinite(found.poses)))

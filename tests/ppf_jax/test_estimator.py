@@ -1,0 +1,153 @@
+"""What the estimator does with clouds as they come, with an untrained model: nothing but clear answers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+from half_visible import half_visible_clouds
+
+from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax import estimator as module
+from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
+from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
+from manipose_mj.ppf_jax.voting import VotingConfig
+from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
+
+KEY = jax.random.key(0)
+CONFIG = ModelConfig(
+    voting=VotingConfig(coarse_votes=300, directions=200, axes_kept=2), pairs=501, points=64
+)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    return TrainedModel(PoseModel(CONFIG, rng=np.random.default_rng(1)), ("mug",))
+
+
+@pytest.fixture(scope="module")
+def mug():
+    return half_visible_clouds("mug", [0], 1, points=250)[0]
+
+
+def test_one_compilation_for_each_bucket(trained, mug, monkeypatch):
+    traced = []
+    whole = PoseModel.estimate
+    monkeypatch.setattr(
+        PoseModel,
+        "estimate",
+        lambda m, p, *a, key: traced.append(len(p)) or whole(m, p, *a, key=key),
+    )
+    estimator = PoseEstimator(trained)
+    for count in (40, 130, 250, 99):
+        answer = estimator.estimate(mug.points[:count], key=KEY)
+        assert answer.pose.shape == (4, 4) and np.isfinite(answer.pose).all()
+    assert traced == [256]
+    repeated = np.tile(mug.points, (6, 1)) + np.float32(1e-4)
+    assert [bucket(n) for n in (32, 256, 257, 512, 1024)] == [256, 256, 512, 512, 1024]
+    estimator.estimate(repeated, key=KEY)
+    estimator.estimate(repeated[:900], key=KEY)
+    assert traced == [256, 1024]
+
+
+def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
+    estimator = PoseEstimator(trained)
+    first, again = (estimator.estimate(mug, key=KEY) for _ in range(2))
+    assert np.array_equal(first.pose, again.pose) and first.confidence == again.confidence
+    assert len(first.hypotheses) == 3 and not first.hypotheses[0].hypotheses
+    assert 0 <= first.confidence <= 1 and np.all(first.extents > 0)
+
+
+def test_stray_points_and_bad_normals_give_no_nan(trained, mug):
+    rng = np.random.default_rng(0)
+    points, normals = mug.points.copy(), mug.normals.copy()
+    stray = rng.random(len(points)) < 0.3
+    points[stray] += rng.normal(scale=0.3, size=(stray.sum(), 3))
+    normals[stray] = 0.0
+    noisy = dataclasses.replace(mug, points=points, normals=normals)
+    half = dataclasses.replace(mug, points=mug.points[:40], normals=mug.normals[:40])
+    line = np.outer(np.linspace(-0.1, 0.1, 50), [1.0, 0, 0]) + [0, 0, 0.6]
+    answers = PoseEstimator(trained).estimate_many([noisy, half, line, mug], key=KEY)
+    for answer in answers:
+        for each in (answer, *answer.hypotheses):
+            assert np.isfinite(each.pose).all() and np.isfinite(each.extents).all()
+            assert np.allclose(each.pose[:3, :3] @ each.pose[:3, :3].T, np.eye(3), atol=1e-3)
+            assert 0 <= each.confidence <= 1
+
+
+def _with(points, row, value):
+    points = points.copy()
+    points[row] = value
+    return points
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda p: p[:20], "20 points; expected at least 32"),
+        (lambda p: p[:, :2], r"shape \(250, 2\)"),
+        (lambda p: p[None], r"shape \(1, 250, 3\)"),
+        (lambda p: p.astype(str), "type <U"),
+        (lambda p: _with(p, 7, np.nan), "1 of 250 points are not finite"),
+        (lambda p: 1000 * p, "millimetres"),
+        (lambda p: np.tile(p[:1], (60, 1)), "all points are equal"),
+    ],
+)
+def test_a_cloud_that_cannot_be_used_gives_one_line(trained, mug, spoil, words):
+    with pytest.raises(InputError, match=words) as caught:
+        PoseEstimator(trained).estimate(spoil(mug.points), key=KEY)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="cloud 1: "):
+        PoseEstimator(trained).estimate_many([mug, spoil(mug.points)], key=KEY)
+
+
+def test_normals_must_fit_the_points(trained, mug):
+    short = dataclasses.replace(mug, normals=mug.normals[:-1])
+    with pytest.raises(InputError, match="normals of shape"):
+        PoseEstimator(trained).estimate(short, key=KEY)
+
+
+def test_names_without_weights(monkeypatch, tmp_path):
+    monkeypatch.setattr(module.resources, "files", lambda _: tmp_path)
+    with pytest.raises(InputError, match="unknown category or type 'mgu'; did you mean mug"):
+        PoseEstimator.load("mgu")
+    with pytest.raises(InputError, match="no weights for mug .*manipose pose train mug"):
+        PoseEstimator.load("mug")
+
+
+def test_a_category_without_weights_gets_its_types(trained, monkeypatch, tmp_path):
+    save_weights(tmp_path / "weights" / "mirror.npz", trained)
+    monkeypatch.setattr(module.resources, "files", lambda _: tmp_path)
+    assert PoseEstimator.load("mug").trained is PoseEstimator.load("mirror").trained
+
+
+def test_weights_come_back_in_half_precision(trained, tmp_path):
+    path = tmp_path / "mug.npz"
+    save_weights(path, trained)
+    back = load_weights(path)
+    assert back.categories == ("mug",) and back.model.config == CONFIG
+    for one, other in zip(jax.tree.leaves(trained.model), jax.tree.leaves(back.model), strict=True):
+        assert np.allclose(one, other, rtol=1e-3, atol=1e-6)
+    assert not [p for p in tmp_path.iterdir() if p != path]
+
+
+@pytest.mark.parametrize("kept", [0, 3, 200, -100])
+def test_a_truncated_file_is_named(trained, tmp_path, kept):
+    path = tmp_path / "mug.npz"
+    save_weights(path, trained)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(InputError, match="mug.npz: not a whole file of weights"):
+        PoseEstimator.from_file(path)
+
+
+def test_weights_of_another_version_are_named(trained, tmp_path, monkeypatch):
+    path = tmp_path / "mug.npz"
+    monkeypatch.setattr("manipose_mj.ppf_jax.weights.FORMAT_VERSION", 99)
+    save_weights(path, trained)
+    monkeypatch.undo()
+    with pytest.raises(InputError, match="weights of format 99; this version reads 1"):
+        PoseEstimator.from_file(path)
+    with pytest.raises(InputError, match="no such file"):
+        PoseEstimator.from_file(tmp_path / "none.npz")

@@ -1,0 +1,79 @@
+"""The pose commands name what is wrong, and their parts fit together."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from manipose_mj.cli.main import main
+from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.curve_picture import draw_curve
+from manipose_mj.ppf_jax.estimator import PoseEstimate
+from manipose_mj.ppf_jax.evaluation import answers, categories_of
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (["pose", "train", "mgu"], "did you mean mug"),
+        (["pose", "train", "cabinet"], "unknown category or type 'cabinet'"),
+        (["pose", "train", "mug", "--views", "0"], "--views is 0"),
+        (["pose", "train", "mug", "--minutes", "-1"], "--minutes is -1"),
+        (["pose", "train", "mug", "--leave-out", "mug"], "leaves nothing of mug"),
+        (["pose", "train", "axial", "--leave-out", "mug"], "unknown category of axial 'mug'"),
+        (["pose", "train", "mug", "--setting", "anywere"], "did you mean anywhere"),
+        (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),
+    ],
+)
+def test_wrong_input_is_one_line(command, message, capsys):
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
+
+
+def test_a_type_is_all_its_rigid_categories():
+    assert categories_of("mug") == ("mug",)
+    assert len(categories_of("axial")) == 18
+    assert sum(len(categories_of(kind)) for kind in ("axial", "mirror", "functional")) == 56
+    with pytest.raises(InputError, match="unknown category or type 'articulated'"):
+        categories_of("articulated")
+
+
+class Parrot:
+    """An estimator that answers with the mean of what it sees."""
+
+    def estimate(self, cloud, *, key):
+        pose = np.eye(4)
+        pose[:3, 3] = (cloud if isinstance(cloud, np.ndarray) else cloud.points).mean(axis=0)
+        return PoseEstimate(pose, np.ones(3), float(len(cloud)))
+
+    def estimate_many(self, clouds, *, key):
+        assert len(clouds) == 4  # always: another number would compile anew
+        return [self.estimate(cloud, key=key) for cloud in clouds]
+
+
+def test_every_cloud_gets_its_own_answer():
+    clouds = []
+    for i in range(10):
+        points = np.full((40 + i, 3), i, np.float32)
+        pose, extents = np.eye(4, dtype=np.float32), np.ones(3, np.float32)
+        group = SymmetryGroup.identity()
+        clouds.append(LabelledCloud(points, points, pose, extents, group, f"a/{i}", "a"))
+    found = answers(Parrot(), clouds, batch=4)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(found.poses[:, 0, 3], np.arange(10))
+    np.testing.assert_array_equal(found.confidence, 40 + np.arange(10))
+    assert found.ms_per_object > 0
+
+
+def test_a_curve_is_drawn_with_and_without_held_out_errors(tmp_path):
+    rows = [{"step": 0, "seconds": 1.0, "loss": 3.0}, {"step": 50, "seconds": 2.0, "loss": 2.0}]
+    checked = [*rows, {"step": 100, "seconds": 3.0, "loss": 1.0, "deg_mean": 5.0, "cm_mean": 1.0}]
+    for name, curve in (("plain", rows), ("checked", checked)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(curve))
+        draw_curve(tmp_path / f"{name}.json", tmp_path / f"{name}.png")
+    assert (tmp_path / "plain.png").read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "plain.png").read_bytes() != (tmp_path / "checked.png").read_bytes()
