@@ -42,7 +42,7 @@ class CheckLimits:
     angular_speed: float = 0.1
     penetration: float = 0.002
     tilt: float = np.deg2rad(10.0)
-    part_vertices: int = 64
+    part_vertices: int = 32
     shut: float = 0.01
     shut_time: float = 2.0
     reach: float = 0.95

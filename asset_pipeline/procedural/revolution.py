@@ -6,6 +6,7 @@ inner wall downwards), its surface normals point out of the material.
 
 from __future__ import annotations
 
+import manifold3d
 import numpy as np
 import trimesh
 from jaxtyping import Float
@@ -145,6 +146,21 @@ def convex_part(points: Float[np.ndarray, "n 3"]) -> Shape:
     hull = trimesh.convex.convex_hull(np.round(points, 9), qhull_options="QbB Pp Qt")
     assert len(hull.vertices) <= MAX_PART_VERTICES, len(hull.vertices)
     return Shape("mesh", mesh=trimesh.Trimesh(hull.vertices, hull.faces, process=False))
+
+
+def halves(part: Shape) -> tuple[Shape, Shape]:
+    """A convex part cut along the xz plane, which it must straddle.
+
+    A plane touches a convex mesh at one corner and its neighbours only: a wide part lying on rounded
+    corners would rock from side to side for ever, and two narrow ones do not.
+    """
+    assert part.mesh is not None
+    whole = manifold3d.Manifold.hull_points(np.array(part.mesh.vertices, np.float64))
+    left, right = (
+        convex_part(np.asarray(half.to_mesh64().vert_properties)[:, :3])
+        for half in whole.split_by_plane((0.0, 1.0, 0.0), 0.0)
+    )
+    return left, right
 
 
 def _around(profile: Float[np.ndarray, "n 2"], angle: float) -> Float[np.ndarray, "n 3"]:

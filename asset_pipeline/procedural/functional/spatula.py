@@ -18,9 +18,11 @@ import shapely
 import shapely.affinity
 from jaxtyping import Float
 
-from asset_pipeline.procedural.extruded import convex_prisms, panel
+from asset_pipeline.geometry import Shape
+from asset_pipeline.procedural.extruded import panel
 from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
+from asset_pipeline.procedural.revolution import halves
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
@@ -126,14 +128,10 @@ def generate(index: int = 0) -> Specimen:
     half = spatula.wall / 2
     outline = _outline(spatula)
     blade = panel(outline, -half, half, rgba=spatula.metal, density=density)
-    # A plane touches one corner of a convex part at a time: on a single part the blade would rock.
-    if spatula.holes == "none":
-        parts = []
-        for y in (-1.0, 0.0):
-            side = shapely.clip_by_rect(outline, -1.0, y, 1.0, y + 1.0)
-            assert isinstance(side, shapely.Polygon)
-            parts += convex_prisms(side, -half, half)
-        blade = replace(blade, collision=tuple(parts))
+    parts = [
+        half for part in blade.collision for half in (halves(part) if _wide(part) else (part,))
+    ]
+    blade = replace(blade, collision=tuple(parts))
     return tool_specimen(
         "spatula",
         [_handle(spatula), _stem(spatula, pose), placed(blade, pose)],
@@ -141,6 +139,12 @@ def generate(index: int = 0) -> Specimen:
         mirror_normal="y",
         functional=(spatula.stem, np.inf),
     )
+
+
+def _wide(part: Shape) -> bool:
+    """Whether a part of the blade reaches far to either side."""
+    low, high = part.surface().bounds[:, 1]
+    return low < -0.01 and high > 0.01
 
 
 def _handle(spatula: Spatula) -> Piece:
@@ -179,7 +183,7 @@ def _stem(spatula: Spatula, pose: Float[np.ndarray, "4 4"]) -> Piece:
     wide = np.concatenate([np.full(11, spatula.rod), np.linspace(1.0, 1.7, 5) * spatula.rod]) / 2
     half = np.column_stack([np.full(len(line), thick), wide])
     half[-1] *= 0.8
-    return bar(
+    stem = bar(
         line,
         half,
         parts=(3, 6, 9, 11, 13),
@@ -187,6 +191,8 @@ def _stem(spatula: Spatula, pose: Float[np.ndarray, "4 4"]) -> Piece:
         density=NYLON if nylon else STEEL,
         power=4.0,
     )
+    *front, foot_part = stem.collision
+    return replace(stem, collision=(*front, *halves(foot_part)))
 
 
 def _outline(spatula: Spatula) -> shapely.Polygon:

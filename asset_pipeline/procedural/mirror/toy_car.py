@@ -18,7 +18,7 @@ from asset_pipeline.mass import solid_mass_properties
 from asset_pipeline.procedural.handles import superellipse
 from asset_pipeline.procedural.mirror.car_parts import CHROME, arch, lamps, pane, road_wheel
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
-from asset_pipeline.procedural.revolution import convex_part
+from asset_pipeline.procedural.revolution import convex_part, halves
 from asset_pipeline.procedural.solids import (
     box,
     loft,
@@ -188,7 +188,10 @@ def _body(car: Car) -> Piece:
         stops = [0.02, 0.05, car.screen, car.back, car.back + 0.005, 0.95, 0.98]
     cuts = tuple(int(np.argmin(np.abs(stations - s))) for s in stops)
     body = solid_piece(
-        loft_outwards(loops), convex_chunks(loops, cuts), rgba=car.colour, density=car.density
+        loft_outwards(loops),
+        [half for chunk in convex_chunks(loops, cuts) for half in halves(chunk)],
+        rgba=car.colour,
+        density=car.density,
     )
     looks = lamps(car.length, car.width, (car.clearance, car.nose), front=True)
     looks += lamps(car.length, car.width, (car.clearance, car.boot), front=False)
@@ -223,7 +226,7 @@ def _cabin(car: Car) -> Piece:
     rings = np.stack(loops)
     parts = [
         convex_part(rings[[0, 2], :].reshape(-1, 3)),
-        convex_part(rings[[2, 4], :].reshape(-1, 3)),
+        *halves(convex_part(rings[[2, 4], :].reshape(-1, 3))),
     ]
     mass = solid_mass_properties(loft(rings), 0.4 * car.density * float(loft(rings).volume))
     looks = [
