@@ -27,7 +27,7 @@ from manipose_mj.ppf_jax.cppf_voting import (
     voted_estimate,
 )
 from manipose_mj.ppf_jax.model import Estimates
-from manipose_mj.ppf_jax.network import Dense
+from manipose_mj.ppf_jax.network import Dense, standardised
 from manipose_mj.ppf_jax.symmetry import common_symmetry
 
 KERNEL_WIDTHS = (32, 64, 32, 32)
@@ -120,11 +120,11 @@ class CppfModel(eqx.Module):
         ]
         hidden = jnp.stack([*lengths, *cosines], axis=-1)
         for layer in self.kernel[:-1]:
-            hidden = jax.nn.relu(_standardised(layer(hidden)))
+            hidden = jax.nn.relu(standardised(layer(hidden)))
         weights = self.kernel[-1](hidden)
         own = jnp.stack([lengths[1], jnp.sum(near_normals * normals[:, None], axis=-1)], axis=-1)
         contracted = jnp.einsum("nkr,nki->nri", weights, own).reshape(len(points), -1)
-        features = _standardised(self.contract(contracted))
+        features = standardised(self.contract(contracted))
         highest = jnp.max(jnp.where(mask[:, None], self.to_global(features), -jnp.inf), axis=0)
         return jnp.concatenate(
             [features, jnp.broadcast_to(highest, (len(points), GLOBAL_WIDTH))], axis=-1
@@ -208,12 +208,6 @@ def unoriented(normals: Float[Array, "n 3"], *, key: PRNGKeyArray) -> Float[Arra
 def _centre(points: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, "3"]:
     """The mean point: keeps coordinates small."""
     return jnp.sum(jnp.where(mask[:, None], points, 0.0), axis=0) / jnp.maximum(jnp.sum(mask), 1)
-
-
-def _standardised(x: Float[Array, "*b f"]) -> Float[Array, "*b f"]:
-    """Layer normalisation; the affine map that follows makes gains and offsets idle."""
-    x = x - jnp.mean(x, axis=-1, keepdims=True)
-    return x / jnp.sqrt(jnp.mean(x**2, axis=-1, keepdims=True) + 1e-5)
 
 
 def _divergence(

@@ -57,6 +57,16 @@ class Dense(eqx.Module):
         return x @ self.weight + self.bias
 
 
+def standardised(x: Float[Array, "*b f"]) -> Float[Array, "*b f"]:
+    """Layer normalisation; the affine map that follows makes gains and offsets idle.
+
+    Features after a rectifier and a maximum are large and positive: without this, a few steps of Adam
+    push all units of the next layer below zero for good.
+    """
+    x = x - jnp.mean(x, axis=-1, keepdims=True)
+    return x / jnp.sqrt(jnp.mean(x**2, axis=-1, keepdims=True) + 1e-5)
+
+
 class PairVotes(eqx.Module):
     """What each pair says, in the units of the cloud it was drawn from.
 

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from manipose_mj.ppf_jax.features import Cloud
-from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, Dense
+from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, Dense, standardised
 from manipose_mj.ppf_jax.rotations import from_vector
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import Hypotheses
@@ -129,14 +129,15 @@ class Refiner(eqx.Module):
                 jax.nn.relu(about),
             ]
         )
-        correction = self.correct(jax.nn.relu(self.correct_hidden(pooled)))
+        pooled = standardised(pooled)
+        correction = self.correct(jax.nn.relu(standardised(self.correct_hidden(pooled))))
         turn = correction[:3]
         length = jnp.sqrt(jnp.sum(turn**2) + 1e-12)
         return Reading(
             turn=turn * jnp.minimum(1.0, _FARTHEST_TURN / length),
             shift=correction[3:6],
             log_extents=log_extents + correction[6:],
-            logits=self.judge(jax.nn.relu(self.judge_hidden(pooled))),
+            logits=self.judge(jax.nn.relu(standardised(self.judge_hidden(pooled)))),
         )
 
     def read(
