@@ -122,14 +122,17 @@ def _solid(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
 
 
 def _stage_for_obj2mjcf(name: str, texture: Path | None, folder: Path) -> None:
-    """Copy the OBJ, its material and its texture under the object's name."""
+    """Copy the OBJ and its texture under the object's name, with a material file that it accepts."""
     assert texture is not None
     folder.mkdir(exist_ok=True)
-    source = texture.parent
-    for path in source.iterdir():
-        if path.suffix in (".mtl", ".png"):
-            shutil.copyfile(path, folder / path.name)
-    shutil.copyfile(source / "textured.obj", folder / f"{name}.obj")
+    lines = (texture.parent / "textured.obj").read_text().splitlines()
+    materials = sorted({line.split()[1] for line in lines if line.startswith("usemtl ")})
+    shutil.copyfile(texture, folder / f"{name}.png")
+    (folder / f"{name}.mtl").write_text(
+        "".join(f"newmtl {m}\nKd 1 1 1\nmap_Kd {name}.png\n" for m in materials)
+    )
+    lines = [f"mtllib {name}.mtl" if line.startswith("mtllib ") else line for line in lines]
+    (folder / f"{name}.obj").write_text("\n".join(lines) + "\n")
 
 
 def _build_ours(
