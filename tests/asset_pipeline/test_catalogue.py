@@ -133,7 +133,6 @@ def test_fresh_processes_agree_and_may_build_the_same_at_once(tmp_path):
 
 
 def test_losing_the_race_keeps_the_winners_folder(monkeypatch, cache_root):
-    row = catalogue.CATALOGUE["cabinet"]
     folder = catalogue.cached("cabinet", 5)
     real_build = catalogue.build
 
