@@ -88,7 +88,7 @@ def test_too_many_vertices_are_named(tmp_path, box):
     wrong = replace(box, folder=tmp_path / "fine", grasps=None)
     write_asset(wrong, (_box_body(collision=(part,)),))
     (result,) = check(tmp_path)
-    assert "162 vertices; at most 64" in result.failures[0]
+    assert "162 vertices; at most 32" in result.failures[0]
 
 
 def test_broken_folders_fail_without_stopping_the_others(tmp_path, box):

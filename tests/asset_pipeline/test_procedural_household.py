@@ -18,7 +18,7 @@ from asset_pipeline.procedural.shell import revolved_loops, wall_parts
 # Of each category: masses [kg]; how far looks and collision parts may be apart [mm]; the greatest
 # number of parts.
 THINGS = {
-    "toy_car": ((0.03, 0.35), 2.5, 20),
+    "toy_car": ((0.03, 0.35), 2.5, 26),
     "toy_airplane": ((0.02, 0.30), 2.5, 56),
     "teapot": ((0.20, 0.60), 2.5, 28),
     "pitcher": ((0.15, 0.50), 3.6, 46),
