@@ -10,8 +10,10 @@ import numpy as np
 from dm_control import composer
 
 from asset_pipeline.assets import Asset
+from asset_pipeline.catalogue import Split
 from manipose_mj.tasks import builtin  # noqa: F401  (registers the tasks)
 from manipose_mj.tasks.observations import SensorConfig
+from manipose_mj.tasks.options import Reward, TaskOptions
 from manipose_mj.tasks.registry import all_tasks, task_spec
 
 ALL_TASKS: tuple[tuple[str, str], ...] = all_tasks()
@@ -25,6 +27,9 @@ def load(
     observations: str = "state+pose",
     sensors: SensorConfig | None = None,
     objects: Sequence[Asset] | None = None,
+    split: Split = "train",
+    reward: Reward = "sparse",
+    randomisation: str = "none",
     environment_kwargs: dict[str, Any] | None = None,
 ) -> composer.Environment:
     """The environment of a registered task.
@@ -36,16 +41,23 @@ def load(
       observations: Any `+` combination of `state`, `pose`, `depth`, `segmentation`, `pointcloud`.
       sensors: Cameras, image size and cloud size.
       objects: Assets to use instead of the built-in ones.
+      split: Which built-in objects, train or test.
+      reward: `"sparse"` or `"dense"`.
+      randomisation: Strength of domain randomisation.
       environment_kwargs: More arguments of `composer.Environment`.
 
     Raises:
       InputError: An unknown task or observation mode, or objects that the task cannot use.
     """
-    built = task_spec(domain, task).factory(
+    options = TaskOptions(
         observations=observations,
         sensors=sensors or SensorConfig(),
         objects=None if objects is None else tuple(objects),
+        split=split,
+        reward=reward,
+        randomisation=randomisation,
     )
+    built = task_spec(domain, task).factory(options)
     arguments: dict[str, Any] = {
         "time_limit": built.config.horizon,
         "random_state": seed,

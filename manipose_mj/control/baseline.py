@@ -57,7 +57,7 @@ class Baseline:
         executor = Executor(self._senses, timestep)
         primitives = Primitives(executor, planner)
         try:
-            plan = make_plan(self._task.goal, executor.perceive())
+            plan = make_plan(self._task.goals, executor.perceive())
         except InputError as error:
             raise StageFailure("plan", str(error)) from None
         for index, step in enumerate(plan):

@@ -9,11 +9,12 @@ from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
 from manipose_mj.control.plan import Plan, Step
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
-from manipose_mj.tasks.goals import Goal, PoseGoal
+from manipose_mj.tasks.goals import Goal, InsideGoal, PoseGoal, ShutGoal
 
 # How far to open, of the joint's range: all the way would ram the stop.
 OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
+SHUT_ENOUGH = 0.005  # of a joint [m or rad]
 # The object is let go this high above the surface it shall rest on [m].
 DROP_HEIGHT = 0.002
 CAVITY_MARGIN = 0.01
@@ -22,15 +23,30 @@ CAVITY_MARGIN = 0.01
 FRONT_SHIFTS = (0.35, 0.5, 0.2)
 
 
-def make_plan(goal: Goal, belief: Belief) -> Plan:
-    """Steps that reach the goal from what is believed.
+def make_plan(goals: tuple[Goal, ...], belief: Belief) -> Plan:
+    """Steps that reach the goals, one after the other, from what is believed.
 
     Raises:
-      InputError: The goal names something that is not there, or the object fits the cavity in no
+      InputError: A goal names something that is not there, or an object fits a cavity in no
         orientation.
     """
-    if isinstance(goal, PoseGoal):
-        return _place(goal.object, (goal.pose,))
+    plan: Plan = ()
+    opened: set[str] = set()
+    for goal in goals:
+        if isinstance(goal, PoseGoal):
+            plan += _place(goal.object, (goal.pose,))
+        elif isinstance(goal, InsideGoal):
+            plan += _put_inside(goal, belief)
+            opened.add(goal.part)
+        elif isinstance(goal, ShutGoal):
+            part = belief.parts[goal.part]
+            if goal.part in opened or part.opening > part.joint.range[0] + SHUT_ENOUGH:
+                plan += _move_part(goal.part, part.joint.range[0])
+    return plan
+
+
+def _put_inside(goal: InsideGoal, belief: Belief) -> Plan:
+    """Open the part unless it is, and put the object behind it."""
     part = belief.parts[goal.part]
     low, high = part.joint.range
     opened = low + OPEN_SHARE * (high - low)
@@ -40,7 +56,7 @@ def make_plan(goal: Goal, belief: Belief) -> Plan:
     plan: Plan = ()
     if part.opening < low + OPEN_ENOUGH * (high - low):
         plan += _move_part(goal.part, opened)
-    return plan + _place(goal.object, poses) + _move_part(goal.part, low)
+    return plan + _place(goal.object, poses)
 
 
 def _place(name: str, poses: tuple[Float[np.ndarray, "4 4"], ...]) -> Plan:

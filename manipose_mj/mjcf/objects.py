@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from dm_control import composer, mjcf
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
@@ -86,6 +86,11 @@ class ArticulatedObject(composer.Entity):
         """`T_world_part`; a part's frame is the object frame while its joint is at zero."""
         body = physics.bind(self._mjcf_root.find("body", part))
         return vector_to_pose(np.concatenate([body.xpos, body.xquat]))
+
+    def part_geoms(self, physics: mjcf.Physics, part: str) -> Int[np.ndarray, "geoms"]:
+        """Ids of the geoms of a moving part."""
+        geoms = self._mjcf_root.find("body", part).find_all("geom")
+        return np.asarray(physics.bind(geoms).element_id)
 
     def handle_pose(self, physics: mjcf.Physics, part: str) -> Float[np.ndarray, "4 4"]:
         """`T_world_handle`, the label of the part's handle.

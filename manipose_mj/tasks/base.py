@@ -1,87 +1,66 @@
-"""What all tasks share: the table, the robot, sensors, action, contact bookkeeping, success once."""
+"""What all tasks share: the table, the robot, sensors, actions, contact bookkeeping, success once."""
 
 from __future__ import annotations
 
 import abc
 from collections import OrderedDict
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_env import specs
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
-from manipose_mj.errors import InputError
 from manipose_mj.mjcf.arena import TableArena
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.mjcf.panda import HOME, MAX_OPENING, POSITION_LIMITS, Panda
-from manipose_mj.tasks.goals import Goal
-from manipose_mj.tasks.observations import SensorConfig, SensorObservables, parse_modes
-from manipose_mj.tasks.success import Tolerance
+from manipose_mj.mjcf.panda import HOME, MAX_OPENING, Panda
+from manipose_mj.poses import pose_error
+from manipose_mj.tasks.action_mode import checked_action
+from manipose_mj.tasks.goals import Goal, PoseGoal, all_met
+from manipose_mj.tasks.observations import SensorObservables, parse_modes
+from manipose_mj.tasks.options import TaskConfig, TaskOptions
+from manipose_mj.tasks.scene_state import ObjectState, PartState, SceneState
 
 CONTROL_TIMESTEP = 0.02
 SETTLE_TIME = 0.3
 
 
-@dataclass(frozen=True)
-class TaskConfig:
-    """What every task can be asked for.
-
-    Attributes:
-      observations: Any `+` combination of the observation modes.
-      sensors: Cameras, image size and cloud size.
-      tolerance: What counts as success.
-      horizon: Time limit of an episode [s].
-    """
-
-    observations: str = "state+pose"
-    sensors: SensorConfig = SensorConfig()
-    tolerance: Tolerance = Tolerance()
-    horizon: float = 60.0
-
-
 class ManipulationTask(composer.Task):
     """A table, a Panda at its edge, and whatever the subclass puts on the table.
 
-    The action is seven joint targets [rad] and the gripper's opening [m] (`pd_joint_pos`).
-    Subclasses fill `self._instances` (what segmentation tells apart) before `_finish_build`.
+    Subclasses fill `self._instances` (what segmentation tells apart), then call `_finish_build`.
     """
 
     @abc.abstractmethod
-    def __init__(self, config: TaskConfig) -> None:
+    def __init__(self, config: TaskConfig, options: TaskOptions) -> None:
         self.config = config
+        self.options = options
         self._arena = TableArena()
         self.robot = Panda()
         self._arena.attach(self.robot)
         self._instances: dict[str, composer.Entity] = {"robot": self.robot}
         self._task_observables: OrderedDict[str, observable.Observable] = OrderedDict()
         self.control_timestep = CONTROL_TIMESTEP
-        self.success_once = False
+        self.success_now = self.success_once = False
         self.max_penetration = 0.0
-        self._geom_masks: dict[composer.Entity, np.ndarray] = {}
+        self._owners: dict[composer.Entity, Int[np.ndarray, "ngeom"]] = {}
+        self._substep = 0
 
-    def _finish_build(self, pose_observables: dict[str, observable.Observable]) -> None:
+    def _finish_build(self, pose_observables: Mapping[str, observable.Observable]) -> None:
         """Add the observables; call once the scene is complete."""
-        self._sensors = SensorObservables(self._instances, self._arena, self.config.sensors)
-        self._task_observables = self._sensors.build(self.config.observations, pose_observables)
-        if "state" in parse_modes(self.config.observations):
+        options = self.options
+        self._sensors = SensorObservables(self._instances, self._arena, options.sensors)
+        self._task_observables = self._sensors.build(options.observations, pose_observables)
+        if "state" in parse_modes(options.observations):
             self.robot.observables.enable_all()
 
     # What a subclass says about its goal.
 
-    @abc.abstractmethod
-    def succeeded(self, physics: mjcf.Physics) -> bool:
-        """Whether the goal is met now."""
-
-    @abc.abstractmethod
-    def goal_error(self, physics: mjcf.Physics) -> tuple[float, float] | None:
-        """Translation [m] and rotation [rad] error to the goal pose; None without a goal pose."""
-
     @property
     @abc.abstractmethod
-    def goal(self) -> Goal:
-        """What this episode wants, for a planner."""
+    def goals(self) -> tuple[Goal, ...]:
+        """What this episode wants, all of it; for a planner too."""
 
     @property
     @abc.abstractmethod
@@ -90,7 +69,7 @@ class ManipulationTask(composer.Task):
 
     @property
     def furnishings(self) -> tuple[ArticulatedObject, ...]:
-        """The articulated objects in play."""
+        """The articulated objects in play; no two have parts of one name."""
         return ()
 
     @property
@@ -101,6 +80,61 @@ class ManipulationTask(composer.Task):
     @abc.abstractmethod
     def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Put objects and goal where the episode starts; the robot is home already."""
+
+    # Success
+
+    def scene_state(self, physics: mjcf.Physics) -> SceneState:
+        """The state that goals and rewards are functions of."""
+        touched, held = self._touching(physics)
+        objects = {}
+        for name, entity in self.movable.items():
+            linear, angular = entity.speeds(physics)
+            objects[name] = ObjectState(
+                label=entity.asset.label,
+                label_pose=entity.label_pose(physics),
+                linear_speed=np.asarray(linear),
+                angular_speed=np.asarray(angular),
+                touched=np.asarray(bool(self._geoms_of(physics, entity)[touched].any())),
+                held=np.asarray(all(self._geoms_of(physics, entity)[g].any() for g in held)),
+            )
+        parts = {}
+        for furniture in self.furnishings:
+            for part in furniture.asset.parts:
+                pose = furniture.part_pose(physics, part.name)
+                parts[part.name] = PartState(
+                    part=part,
+                    opening=np.asarray(furniture.opening(physics, part.name)),
+                    handle_pose=furniture.handle_pose(physics, part.name) if part.handle else pose,
+                    cavity_pose=furniture.cavity_pose(physics, part.name) if part.cavity else pose,
+                    touched=np.asarray(
+                        bool(np.isin(touched, furniture.part_geoms(physics, part.name)).any())
+                    ),
+                )
+        return SceneState(
+            tcp_pose=self.robot.tcp_pose(physics),
+            gripper=np.asarray(self.robot.configuration(physics)[1]),
+            objects=objects,
+            parts=parts,
+        )
+
+    def succeeded(self, physics: mjcf.Physics) -> bool:
+        """Whether all goals are met now."""
+        return bool(all_met(self.goals, self.scene_state(physics), self.config.tolerance))
+
+    def goal_error(self, physics: mjcf.Physics) -> tuple[float, float] | None:
+        """The largest translation [m] and rotation [rad] error to a goal pose; None without one."""
+        errors = [
+            pose_error(
+                self.movable[goal.object].label_pose(physics),
+                goal.pose,
+                self.movable[goal.object].asset.label.symmetry,
+            )
+            for goal in self.goals
+            if isinstance(goal, PoseGoal)
+        ]
+        if not errors:
+            return None
+        return float(max(e[0] for e in errors)), float(max(e[1] for e in errors))
 
     # composer.Task
 
@@ -118,12 +152,10 @@ class ManipulationTask(composer.Task):
         return ("background", *self._instances)
 
     def action_spec(self, physics: mjcf.Physics) -> specs.BoundedArray:
-        minimum = np.append(POSITION_LIMITS[:, 0], 0.0)
-        maximum = np.append(POSITION_LIMITS[:, 1], MAX_OPENING)
-        return specs.BoundedArray((8,), np.float64, minimum, maximum, name="pd_joint_pos")
+        return self.options.action_mode.spec()
 
     def initialize_episode_mjcf(self, random_state: np.random.RandomState) -> None:
-        self._geom_masks.clear()
+        self._owners.clear()
 
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
@@ -131,29 +163,34 @@ class ManipulationTask(composer.Task):
         self._sensors.forget()
         self.robot.set_configuration(physics, HOME, MAX_OPENING)
         self.place_objects(physics, random_state)
-        self.success_once = False
         # dm_control's step begins with the second half of the last one.
         physics.forward()
         physics.step(round(SETTLE_TIME / self.physics_timestep))
         physics.data.time = 0.0
+        self.options.action_mode.reset(physics, self.robot)
+        self.success_now = self.success_once = False
         self.max_penetration = 0.0
 
     def before_step(
         self,
         physics: mjcf.Physics,
-        action: Float[np.ndarray, "8"],
+        action: Float[np.ndarray, "n"],
         random_state: np.random.RandomState,
     ) -> None:
-        try:
-            action = np.asarray(action, float)
-        except (TypeError, ValueError):
-            action = np.empty(0)
-        if action.shape != (8,) or not np.isfinite(action).all():
-            raise InputError(
-                f"action has shape {action.shape} and values {action.ravel()[:8].tolist()}; "
-                "expected 8 finite numbers: seven joint targets [rad] and an opening [m]"
-            )
-        self.robot.apply_targets(physics, action[:7], float(action[7]))
+        mode = self.options.action_mode
+        mode.begin(physics, self.robot, checked_action(mode, action))
+        self._substep = 0
+
+    def before_substep(
+        self,
+        physics: mjcf.Physics,
+        action: Float[np.ndarray, "n"],
+        random_state: np.random.RandomState,
+    ) -> None:
+        self._substep += 1
+        share = self._substep / self.physics_steps_per_control_step
+        joints, opening = self.options.action_mode.targets(physics, self.robot, share)
+        self.robot.apply_targets(physics, joints, opening)
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         if physics.data.ncon:
@@ -168,17 +205,29 @@ class ManipulationTask(composer.Task):
     def get_reward(self, physics: mjcf.Physics) -> float:
         return float(self.success_now)
 
-    def _geoms_of(self, physics: mjcf.Physics, entity: composer.Entity) -> np.ndarray:
+    # Contacts
+
+    def _geoms_of(self, physics: mjcf.Physics, entity: composer.Entity) -> Bool[np.ndarray, "g"]:
         """A mask over geom ids, `(ngeom,)`, looked up once per compiled model."""
-        if entity not in self._geom_masks:
+        if entity not in self._owners:
             mask = np.zeros(physics.model.ngeom, bool)
             mask[physics.bind(entity.mjcf_model.find_all("geom")).element_id] = True
-            self._geom_masks[entity] = mask
-        return self._geom_masks[entity]
+            self._owners[entity] = mask
+        return self._owners[entity]
+
+    def _touching(
+        self, physics: mjcf.Physics
+    ) -> tuple[Int[np.ndarray, "n"], tuple[Int[np.ndarray, "a"], Int[np.ndarray, "b"]]]:
+        """Ids of the geoms that the robot touches; and those that its left and right pad touch."""
+        contact = physics.data.contact
+        pairs = np.concatenate([contact.geom, contact.geom[:, ::-1]])
+        touching = pairs[self._geoms_of(physics, self.robot)[pairs[:, 0]]]
+        left, right = physics.bind(self.robot.pad_geoms).element_id
+        return touching[:, 1], (
+            touching[touching[:, 0] == left, 1],
+            touching[touching[:, 0] == right, 1],
+        )
 
     def touches_robot(self, physics: mjcf.Physics, entity: composer.Entity) -> bool:
         """Whether any geom of the robot touches any geom of the entity."""
-        contact = physics.data.contact
-        own, robot = self._geoms_of(physics, entity), self._geoms_of(physics, self.robot)
-        first, second = contact.geom1, contact.geom2
-        return bool(np.any((robot[first] & own[second]) | (own[first] & robot[second])))
+        return bool(self._geoms_of(physics, entity)[self._touching(physics)[0]].any())

@@ -6,18 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from asset_pipeline.assets import Asset
 from manipose_mj.errors import unknown_name
 from manipose_mj.tasks.base import ManipulationTask
-from manipose_mj.tasks.observations import SensorConfig
+from manipose_mj.tasks.options import TaskOptions
 
 
 class TaskFactory(Protocol):
     """Builds a task from what its users may choose."""
 
-    def __call__(
-        self, *, observations: str, sensors: SensorConfig, objects: tuple[Asset, ...] | None
-    ) -> ManipulationTask: ...
+    def __call__(self, options: TaskOptions) -> ManipulationTask: ...
 
 
 @dataclass(frozen=True)

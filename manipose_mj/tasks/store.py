@@ -13,10 +13,10 @@ from jaxtyping import Float
 from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.poses import invert, rotation_about
-from manipose_mj.tasks.base import ManipulationTask, TaskConfig
-from manipose_mj.tasks.goals import StoreGoal
-from manipose_mj.tasks.success import inside_cavity, stored
+from manipose_mj.poses import rotation_about
+from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.tasks.goals import Goal, InsideGoal, ShutGoal
+from manipose_mj.tasks.options import TaskConfig, TaskOptions
 from manipose_mj.tasks.target_pose import pose_on_table
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -44,9 +44,15 @@ class Store(ManipulationTask):
     the drawer is shut to within 1 cm.
     """
 
-    def __init__(self, asset: Asset, furniture: Asset, config: StoreConfig | None = None) -> None:
+    def __init__(
+        self,
+        asset: Asset,
+        furniture: Asset,
+        config: StoreConfig | None = None,
+        options: TaskOptions | None = None,
+    ) -> None:
         self.task_config = config or StoreConfig()
-        super().__init__(self.task_config)
+        super().__init__(self.task_config, options or TaskOptions())
         self.part = furniture.part(self.task_config.part)
         if self.part.cavity is None or self.part.handle is None:
             raise InputError(
@@ -77,8 +83,8 @@ class Store(ManipulationTask):
         return self.object.asset.name
 
     @property
-    def goal(self) -> StoreGoal:
-        return StoreGoal("object", self.part.name)
+    def goals(self) -> tuple[Goal, ...]:
+        return (InsideGoal("object", self.part.name), ShutGoal(self.part.name))
 
     @property
     def movable(self) -> dict[str, RigidObject]:
@@ -112,35 +118,3 @@ class Store(ManipulationTask):
         )
         pose = pose_on_table(self.object.asset, start, xy, random_state.uniform(-np.pi, np.pi))
         self.object.place(physics, pose)
-
-    def succeeded(self, physics: mjcf.Physics) -> bool:
-        linear, angular = self.object.speeds(physics)
-        tolerance = self.config.tolerance
-        return bool(
-            stored(
-                np.asarray(self.inside(physics)),
-                np.asarray(self.furniture.opening(physics, self.part.name)),
-                self.part.joint.range[0],
-                np.asarray(linear),
-                np.asarray(angular),
-                np.asarray(self.touches_robot(physics, self.object)),
-                tolerance,
-            )
-        )
-
-    def inside(self, physics: mjcf.Physics) -> bool:
-        """Whether the object's bounding box lies in the cavity."""
-        assert self.part.cavity is not None
-        label_pose_cavity = invert(self.cavity_pose(physics)) @ self.object.label_pose(physics)
-        return bool(
-            inside_cavity(
-                label_pose_cavity,
-                self.object.asset.label.extents,
-                self.object.asset.label.symmetry.axial,
-                self.part.cavity.extents,
-                self.config.tolerance.cavity_slack,
-            )
-        )
-
-    def goal_error(self, physics: mjcf.Physics) -> None:
-        return None

@@ -89,17 +89,3 @@ def inside_cavity(
         reach = rotation @ half
     limit = xp.asarray(cavity_extents, dtype=dtype) / 2 + slack
     return xp.all(xp.abs(label_pose_cavity[..., :3, 3]) + reach <= limit, axis=-1)
-
-
-def stored(
-    inside: Bool[Array, "*b"],
-    joint_position: Float[Array, "*b"],
-    joint_shut: float,
-    linear_speed: Float[Array, "*b"],
-    angular_speed: Float[Array, "*b"],
-    touched: Bool[Array, "*b"],
-    tolerance: Tolerance,
-) -> Bool[Array, "*b"]:
-    """Whether the object rests inside, released, and the drawer or door is shut."""
-    shut = joint_position - joint_shut < tolerance.shut
-    return inside & shut & at_rest(linear_speed, angular_speed, tolerance) & ~touched

@@ -14,12 +14,11 @@ from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.goal_marker import GoalMarker
 from manipose_mj.mjcf.objects import RigidObject
-from manipose_mj.poses import compose, pose_error, rotation_about
-from manipose_mj.tasks.base import ManipulationTask, TaskConfig
+from manipose_mj.poses import compose, rotation_about
+from manipose_mj.tasks.base import ManipulationTask
 from manipose_mj.tasks.goals import PoseGoal
-from manipose_mj.tasks.success import pose_goal_met
-
-PARKING_HEIGHT = 50.0
+from manipose_mj.tasks.object_pool import ObjectPool
+from manipose_mj.tasks.options import TaskConfig, TaskOptions
 
 
 @dataclass(frozen=True)
@@ -44,19 +43,17 @@ class TargetPose(ManipulationTask):
     episode does not use wait high above the scene, weightless: a change of object needs no new model.
     """
 
-    def __init__(self, assets: tuple[Asset, ...], config: TargetPoseConfig | None = None) -> None:
-        if not assets:
-            raise InputError("target_pose takes at least one object; got none")
+    def __init__(
+        self,
+        assets: tuple[Asset, ...],
+        config: TargetPoseConfig | None = None,
+        options: TaskOptions | None = None,
+    ) -> None:
         self.task_config = config or TargetPoseConfig()
-        super().__init__(self.task_config)
+        super().__init__(self.task_config, options or TaskOptions())
         self._pairs = [_pose_pairs(asset, self.task_config) for asset in assets]
-        self._objects = [RigidObject(asset, name=f"object_{i}") for i, asset in enumerate(assets)]
-        for index, entity in enumerate(self._objects):
-            # Parked in the model too: objects that begin in one place would burst apart.
-            self._arena.add_free_entity(entity).pos = _parking_place(index)
-            for body in entity.mjcf_model.find_all("body"):
-                body.gravcomp = 1
-        self._instances.update({e.mjcf_model.model: e for e in self._objects})
+        self._pool = ObjectPool(assets, self._arena)
+        self._instances.update({e.mjcf_model.model: e for e in self._pool.entities})
         self._marker = GoalMarker()
         self._arena.attach(self._marker)
         self._active = 0
@@ -71,26 +68,23 @@ class TargetPose(ManipulationTask):
     @property
     def object(self) -> RigidObject:
         """The object of this episode."""
-        return self._objects[self._active]
+        return self._pool.entities[self._active]
 
     @property
     def object_name(self) -> str:
         return self.object.asset.name
 
     @property
-    def goal(self) -> PoseGoal:
-        return PoseGoal("object", self._goal.copy())
+    def goals(self) -> tuple[PoseGoal]:
+        return (PoseGoal("object", self._goal.copy()),)
 
     @property
     def movable(self) -> dict[str, RigidObject]:
         return {"object": self.object}
 
     def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        self._active = int(random_state.randint(len(self._objects)))
-        for index, entity in enumerate(self._objects):
-            active = index == self._active
-            entity.place(physics, compose(np.eye(3), _parking_place(index)))
-            physics.bind(entity.mjcf_model.find_all("body")).gravcomp = 0.0 if active else 1.0
+        self._active = int(random_state.randint(len(self._pool.entities)))
+        self._pool.use(physics, (self._active,))
         asset = self.object.asset
         pairs = self._pairs[self._active]
         start, goal = pairs[random_state.randint(len(pairs))]
@@ -110,31 +104,6 @@ class TargetPose(ManipulationTask):
             start, goal = random_state.uniform(low, high), random_state.uniform(low, high)
             if np.linalg.norm(start - goal) >= config.min_distance:
                 return start, goal
-
-    def succeeded(self, physics: mjcf.Physics) -> bool:
-        linear, angular = self.object.speeds(physics)
-        return bool(
-            pose_goal_met(
-                self.object.label_pose(physics),
-                self._goal,
-                np.asarray(linear),
-                np.asarray(angular),
-                np.asarray(self.touches_robot(physics, self.object)),
-                self.object.asset.label.symmetry,
-                self.config.tolerance,
-            )
-        )
-
-    def goal_error(self, physics: mjcf.Physics) -> tuple[float, float]:
-        translation, rotation = pose_error(
-            self.object.label_pose(physics), self._goal, self.object.asset.label.symmetry
-        )
-        return float(translation), float(rotation)
-
-
-def _parking_place(index: int) -> Float[np.ndarray, "3"]:
-    """Where an object waits that the episode does not use [m]."""
-    return np.array([float(index), 0.0, PARKING_HEIGHT])
 
 
 def pose_on_table(

@@ -130,7 +130,7 @@ def _fail(monkeypatch, actions, task: str = TARGET_POSE) -> EpisodeResult:
 @pytest.mark.parametrize("away", [(2.0, 0.0, 0.1), (0.5, 0.0, -0.3)], ids=["far", "in the table"])
 def test_a_goal_out_of_reach_fails_in_planning(monkeypatch, away):
     goal = PoseGoal("object", compose(np.eye(3), np.array(away)))
-    monkeypatch.setattr(TargetPose, "goal", property(lambda self: goal))
+    monkeypatch.setattr(TargetPose, "goals", property(lambda self: (goal,)))
     result, _ = _run(TARGET_POSE, 0)
     assert (result.failure, result.success_at_end, result.success_once) == ("plan", False, False)
     assert "object" in result.reason

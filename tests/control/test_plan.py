@@ -16,7 +16,7 @@ from manipose_mj.control.plan import PLAN_SCHEMA, Step, plan_from_json, plan_to_
 from manipose_mj.control.planner import make_plan, poses_in_cavity
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about
-from manipose_mj.tasks.goals import PoseGoal, StoreGoal
+from manipose_mj.tasks.goals import InsideGoal, PoseGoal, ShutGoal
 from manipose_mj.tasks.success import inside_cavity
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -120,32 +120,33 @@ def _words(plan) -> list[str]:
     return [str(step) for step in plan]
 
 
+STORE = (InsideGoal("object", "drawer"), ShutGoal("drawer"))
 PLACE = ["grasp_at object", "move_to object", "release object"]
 PART = ["grasp_at drawer", "move_to drawer", "release drawer"]
 
 
 def test_a_pose_goal_is_grasp_move_release():
-    plan = make_plan(PoseGoal("object", POSE), _belief())
+    plan = make_plan((PoseGoal("object", POSE),), _belief())
     assert _words(plan) == PLACE
     np.testing.assert_array_equal(plan[1].poses[0], POSE)
 
 
 @pytest.mark.parametrize("opening", [0.0, 0.1])
 def test_a_shut_or_half_open_drawer_is_opened_filled_and_shut(opening):
-    plan = make_plan(StoreGoal("object", "drawer"), _belief(opening))
+    plan = make_plan(STORE, _belief(opening))
     assert _words(plan) == PART + PLACE + PART
     assert plan[1].opening is not None and 0.17 < plan[1].opening < 0.2  # not into its stop
     assert plan[7].opening == 0.0
 
 
 def test_an_open_drawer_is_not_opened_again():
-    plan = make_plan(StoreGoal("object", "drawer"), _belief(0.19))
+    plan = make_plan(STORE, _belief(0.19))
     assert _words(plan) == PLACE + PART
 
 
 def test_an_object_that_fits_no_way_is_refused():
     with pytest.raises(InputError, match="object fits the cavity of drawer in no orientation"):
-        make_plan(StoreGoal("object", "drawer"), _belief(thing=_object((0.35, 0.08, 0.08))))
+        make_plan(STORE, _belief(thing=_object((0.35, 0.08, 0.08))))
     drawer = replace(_drawer(), cavity=None)
     assert poses_in_cavity(_object(), drawer, 0.1) == ()
 

@@ -7,8 +7,20 @@ from math import radians
 import numpy as np
 import pytest
 
+from asset_pipeline.assets import Cavity, MovingPart
+from asset_pipeline.geometry import Joint
+from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
-from manipose_mj.tasks.success import Tolerance, inside_cavity, pose_goal_met, stored
+from manipose_mj.tasks.goals import (
+    InsideGoal,
+    OnTableGoal,
+    OpenGoal,
+    OrientationGoal,
+    ShutGoal,
+    all_met,
+)
+from manipose_mj.tasks.scene_state import ObjectState, PartState, SceneState
+from manipose_mj.tasks.success import Tolerance, inside_cavity, pose_goal_met
 
 X, Y, Z = np.eye(3)
 TOLERANCE = Tolerance()
@@ -110,28 +122,76 @@ def test_the_reach_of_a_tilted_cylinder_is_that_of_its_surface():
         assert not inside_cavity(_pose(tilt, Y), extents, True, less, 0.0)
 
 
+DRAWER = MovingPart(
+    "drawer",
+    Joint("slide", np.zeros(3), np.array([-1.0, 0.0, 0.0]), (0.1, 0.3)),
+    None,
+    Cavity(np.zeros(3), CAVITY, moves_with_part=True),
+)
 STORED = {
-    "inside": True,
-    "joint_position": 0.105,
+    "label_pose": _pose(),
+    "opening": 0.105,
     "linear_speed": 0.0,
     "angular_speed": 0.0,
     "touched": False,
 }
 
 
+def _state(asarray, **case) -> SceneState:
+    case = {name: asarray(value) for name, value in {**STORED, **case}.items()}
+    no, here = asarray(False), asarray(_pose())
+    label = PoseLabel(np.zeros(3), np.eye(3), "axial", CAN, SymmetryGroup.about_x())
+    part = PartState(DRAWER, case.pop("opening"), here, here, no)
+    return SceneState(
+        here, asarray(0.0), {"can": ObjectState(label=label, held=no, **case)}, {"drawer": part}
+    )
+
+
 @pytest.mark.parametrize(
     ("changes", "met"),
     [
         ({}, True),
-        ({"joint_position": 0.1095}, True),
-        ({"joint_position": 0.1105}, False),
-        ({"joint_position": 0.0995}, True),  # pressed into its stop
-        ({"inside": False}, False),
+        ({"opening": 0.1095}, True),
+        ({"opening": 0.1105}, False),
+        ({"opening": 0.0995}, True),  # pressed into its stop
+        ({"label_pose": _pose(shift=(0.0, 0.0, 0.5))}, False),
         ({"linear_speed": 0.02}, False),
         ({"angular_speed": 0.2}, False),
         ({"touched": True}, False),
     ],
 )
 def test_storing_needs_every_condition(asarray, changes, met):
-    case = {name: asarray(value) for name, value in {**STORED, **changes}.items()}
-    assert bool(stored(joint_shut=0.1, tolerance=TOLERANCE, **case)) is met
+    goals = (InsideGoal("can", "drawer"), ShutGoal("drawer"))
+    assert bool(all_met(goals, _state(asarray, **changes), TOLERANCE)) is met
+
+
+@pytest.mark.parametrize(
+    ("goal", "changes", "met"),
+    [
+        (OpenGoal("drawer"), {"opening": 0.281}, True),
+        (OpenGoal("drawer"), {"opening": 0.279}, False),
+        (ShutGoal("drawer", 0.9), {"opening": 0.119}, True),
+        (ShutGoal("drawer", 0.9), {"opening": 0.121}, False),
+        (OnTableGoal("can"), {"label_pose": _pose(shift=(0.0, 0.0, 0.05))}, True),
+        (OnTableGoal("can"), {"label_pose": _pose(shift=(0.0, 0.0, -0.7))}, False),
+        (OrientationGoal("can", _pose(0.2, Y)[:3, :3]), {}, False),
+        (OrientationGoal("can", _pose(0.2, Y)[:3, :3]), {"label_pose": _pose(0.4, Y, (1, 1, 0.1))}, True),
+        (OrientationGoal("can", _pose(0.2, Y)[:3, :3]), {"label_pose": _pose(0.5, Y, (1, 1, 0.1))}, False),
+        (OrientationGoal("can", _pose(2.0, X)[:3, :3]), {"label_pose": _pose(shift=(0.0, 0.0, 0.1))}, True),
+        (OrientationGoal("can", np.eye(3)), {"label_pose": _pose(shift=(0, 0, 0.1)), "touched": True}, False),
+    ],
+)  # fmt: skip
+def test_single_conditions(asarray, goal, changes, met):
+    assert bool(goal.met(_state(asarray, **changes), TOLERANCE)) is met
+
+
+def test_states_may_be_batches(asarray):
+    poses = np.stack([_pose(shift=(0.0, 0.0, z)) for z in (0.0, 0.5)])
+    flags = {
+        "linear_speed": np.zeros(2),
+        "angular_speed": np.zeros(2),
+        "touched": np.zeros(2, bool),
+    }
+    state = _state(asarray, label_pose=poses, opening=np.full(2, 0.1), **flags)
+    goals = (InsideGoal("can", "drawer"), ShutGoal("drawer"))
+    assert np.asarray(all_met(goals, state, TOLERANCE)).tolist() == [True, False]

@@ -208,7 +208,7 @@ def test_unused_objects_stay_parked_and_out_of_sight():
         }
         assert seen <= {0, task.instance_names.index("robot"), active}
         assert active in seen
-        for index, entity in enumerate(task._objects):
+        for index, entity in enumerate(task._pool.entities):
             if entity is not task.object:
                 pose = entity.object_pose(environment.physics)
                 parked = compose(np.eye(3), np.array([index, 0.0, 50.0]))
@@ -288,7 +288,7 @@ def test_the_object_set_down_at_its_goal_is_a_success(target_pose):
     task = _reset(target_pose, 0)
     physics = target_pose.physics
     assert task.goal_error(physics)[0] > 0.1
-    task.object.place(physics, task.goal.pose @ invert(task.object.asset.label.pose))
+    task.object.place(physics, task.goals[0].pose @ invert(task.object.asset.label.pose))
     _hold(target_pose, 0.3)
     step = target_pose.step(HOLD)
     assert step.reward == 1.0 and task.success_once

@@ -1,0 +1,1 @@
+"""The registered tasks of the family `clutter`, on the built-in catalogue."""

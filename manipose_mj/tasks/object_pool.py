@@ -1,0 +1,54 @@
+"""Objects of which an episode uses some: the others wait high above, weightless.
+
+A change of objects then needs no new model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from dm_control import composer, mjcf
+from jaxtyping import Float
+
+from asset_pipeline.assets import Asset
+from manipose_mj.errors import InputError
+from manipose_mj.mjcf.objects import RigidObject
+from manipose_mj.poses import compose
+
+PARKING_HEIGHT = 50.0
+
+
+class ObjectPool:
+    """The rigid objects of a task.
+
+    Attributes:
+      entities: All of them, `object_0`, `object_1` and so on, in the order of the assets.
+    """
+
+    def __init__(self, assets: Sequence[Asset], arena: composer.Arena) -> None:
+        """Attach an entity for each asset; the same asset may come twice.
+
+        Raises:
+          InputError: There is none.
+        """
+        if not assets:
+            raise InputError("a task takes at least one object; got none")
+        self.entities = tuple(
+            RigidObject(asset, name=f"object_{index}") for index, asset in enumerate(assets)
+        )
+        for index, entity in enumerate(self.entities):
+            # Parked in the model too: objects that begin in one place would burst apart.
+            arena.add_free_entity(entity).pos = _parking_place(index)
+            for body in entity.mjcf_model.find_all("body"):
+                body.gravcomp = 1
+
+    def use(self, physics: mjcf.Physics, indices: Sequence[int]) -> None:
+        """Give these their weight and park all; the caller then places those that are used."""
+        for index, entity in enumerate(self.entities):
+            entity.place(physics, compose(np.eye(3), _parking_place(index)))
+            physics.bind(entity.mjcf_model.find_all("body")).gravcomp = float(index not in indices)
+
+
+def _parking_place(index: int) -> Float[np.ndarray, "3"]:
+    return np.array([float(index), 0.0, PARKING_HEIGHT])
