@@ -21,6 +21,7 @@ from manipose_mj.tasks.goals import Goal, PoseGoal, all_met
 from manipose_mj.tasks.observations import SensorObservables, parse_modes
 from manipose_mj.tasks.options import TaskConfig, TaskOptions
 from manipose_mj.tasks.scene_state import ObjectState, PartState, SceneState
+from manipose_mj.tasks.shaping import dense_reward
 
 CONTROL_TIMESTEP = 0.02
 SETTLE_TIME = 0.3
@@ -203,7 +204,10 @@ class ManipulationTask(composer.Task):
         self.success_once = self.success_once or self.success_now
 
     def get_reward(self, physics: mjcf.Physics) -> float:
-        return float(self.success_now)
+        if self.options.reward == "sparse" or self.success_now:
+            return float(self.success_now)
+        state = self.scene_state(physics)
+        return min(float(dense_reward(self.goals, state, self.config.tolerance)), 0.999)
 
     # Contacts
 

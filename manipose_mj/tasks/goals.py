@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.poses import Array, compose, invert, namespace, pose_error
+from manipose_mj.tasks import shaping
 from manipose_mj.tasks.scene_state import SceneState
 from manipose_mj.tasks.success import Tolerance, at_rest, inside_cavity, pose_goal_met
 
@@ -22,6 +23,10 @@ class Goal(Protocol):
 
     def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
         """Whether it holds in this state."""
+        ...
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """How near it is, in [0, 1], for dense rewards; from `shaping.PLACED` on it is all but met."""
         ...
 
 
@@ -44,6 +49,15 @@ class PoseGoal:
             thing.label.symmetry,
             tolerance,
         )
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Reach, hold, carry, let go."""
+        thing = state.objects[self.object]
+        wanted = namespace(thing.label_pose).asarray(self.pose, dtype=thing.label_pose.dtype)
+        way, angle = pose_error(thing.label_pose, wanted, thing.label.symmetry)
+        placed = (way < tolerance.translation) & (angle < tolerance.rotation)
+        left = way + shaping.turn_as_way(angle)
+        return shaping.object_progress(state, thing, placed, left, tolerance)
 
 
 @dataclass(frozen=True)
@@ -68,6 +82,14 @@ class OrientationGoal:
         on_table = thing.label_pose[..., 2, 3] > 0.0
         return (self.error(state) < tolerance.rotation) & rest & on_table & ~thing.touched
 
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Reach, hold, turn, set down."""
+        thing = state.objects[self.object]
+        angle = self.error(state)
+        placed = (angle < tolerance.rotation) & (thing.label_pose[..., 2, 3] > 0.0)
+        left = shaping.turn_as_way(angle)
+        return shaping.object_progress(state, thing, placed, left, tolerance)
+
 
 @dataclass(frozen=True)
 class InsideGoal:
@@ -91,6 +113,26 @@ class InsideGoal:
         )
         return inside & at_rest(thing.linear_speed, thing.angular_speed, tolerance) & ~thing.touched
 
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Open, reach, hold, carry inside, let go."""
+        thing, furniture = state.objects[self.object], state.parts[self.part]
+        xp = namespace(thing.label_pose)
+        if furniture.part.cavity is None:
+            return xp.zeros_like(thing.linear_speed)
+        in_cavity = invert(furniture.cavity_pose) @ thing.label_pose
+        half = xp.asarray(furniture.part.cavity.extents, dtype=in_cavity.dtype) / 2
+        beyond = xp.clip(xp.abs(in_cavity[..., :3, 3]) - half, 0.0, None)
+        left = xp.sqrt(xp.sum(beyond**2, axis=-1))
+        placed = inside_cavity(
+            in_cavity,
+            thing.label.extents,
+            thing.label.symmetry.axial,
+            furniture.part.cavity.extents,
+            tolerance.cavity_slack,
+        )
+        by_itself = shaping.object_progress(state, thing, placed, left, tolerance)
+        return shaping.through_part(state, furniture, placed, by_itself)
+
 
 @dataclass(frozen=True)
 class OpenGoal:
@@ -102,6 +144,11 @@ class OpenGoal:
     def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
         """Whether it holds in this state."""
         return state.parts[self.part].fraction >= self.fraction
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Reach, open."""
+        furniture = state.parts[self.part]
+        return shaping.part_progress(state, furniture, furniture.fraction / self.fraction)
 
 
 @dataclass(frozen=True)
@@ -119,6 +166,11 @@ class ShutGoal:
             return 1 - furniture.fraction >= self.fraction
         return furniture.opening - furniture.part.joint.range[0] < tolerance.shut
 
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Reach, shut."""
+        furniture = state.parts[self.part]
+        return shaping.part_progress(state, furniture, 1 - furniture.fraction)
+
 
 @dataclass(frozen=True)
 class OnTableGoal:
@@ -129,6 +181,11 @@ class OnTableGoal:
     def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
         """Whether it holds in this state."""
         return state.objects[self.object].label_pose[..., 2, 3] > 0.0
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """All or nothing."""
+        pose = state.objects[self.object].label_pose
+        return namespace(pose).where(self.met(state, tolerance), 1.0, 0.0)
 
 
 def all_met(goals: tuple[Goal, ...], state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
