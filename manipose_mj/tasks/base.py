@@ -20,6 +20,7 @@ from manipose_mj.tasks.action_mode import checked_action
 from manipose_mj.tasks.goals import Goal, PoseGoal, all_met
 from manipose_mj.tasks.observations import SensorObservables, parse_modes
 from manipose_mj.tasks.options import TaskConfig, TaskOptions
+from manipose_mj.tasks.randomisation import Delay, Randomiser, randomisation
 from manipose_mj.tasks.scene_state import ObjectState, PartState, SceneState
 from manipose_mj.tasks.shaping import dense_reward
 
@@ -47,6 +48,8 @@ class ManipulationTask(composer.Task):
         self.max_penetration = 0.0
         self._owners: dict[composer.Entity, Int[np.ndarray, "ngeom"]] = {}
         self._substep = 0
+        self._randomiser = Randomiser(randomisation(options.randomisation))
+        self._delay = Delay()
 
     def _finish_build(self, pose_observables: Mapping[str, observable.Observable]) -> None:
         """Add the observables; call once the scene is complete."""
@@ -137,6 +140,10 @@ class ManipulationTask(composer.Task):
             return None
         return float(max(e[0] for e in errors)), float(max(e[1] for e in errors))
 
+    def forget_images(self) -> None:
+        """Drop what was rendered: the state has been changed from outside."""
+        self._sensors.forget()
+
     # composer.Task
 
     @property
@@ -162,7 +169,11 @@ class ManipulationTask(composer.Task):
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
         self._sensors.forget()
+        latency = 0.0
+        if self._randomiser.active:
+            latency = self._randomise(physics, random_state)
         self.robot.set_configuration(physics, HOME, MAX_OPENING)
+        self._delay.start(round(latency / self.physics_timestep), np.append(HOME, MAX_OPENING))
         self.place_objects(physics, random_state)
         # dm_control's step begins with the second half of the last one.
         physics.forward()
@@ -191,7 +202,8 @@ class ManipulationTask(composer.Task):
         self._substep += 1
         share = self._substep / self.physics_steps_per_control_step
         joints, opening = self.options.action_mode.targets(physics, self.robot, share)
-        self.robot.apply_targets(physics, joints, opening)
+        arrived = self._delay.through(np.append(joints, opening))
+        self.robot.apply_targets(physics, arrived[:7], float(arrived[7]))
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         if physics.data.ncon:
@@ -208,6 +220,11 @@ class ManipulationTask(composer.Task):
             return float(self.success_now)
         state = self.scene_state(physics)
         return min(float(dense_reward(self.goals, state, self.config.tolerance)), 0.999)
+
+    def _randomise(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> float:
+        objects = [e for e in self._instances.values() if isinstance(e, RigidObject)]
+        pads = np.asarray(physics.bind(self.robot.pad_geoms).element_id)
+        return self._randomiser.apply(physics, objects, pads.tolist(), random_state)
 
     # Contacts
 
