@@ -9,6 +9,11 @@ from jaxtyping import Int
 
 # Of edges that two faces share, from which on a surface has an inside.
 NEARLY_CLOSED = 0.98
+# A vertex as far from its nearest neighbour as this many times the edges around: on 32 scans as
+# published the ratio is below 1.2.
+SPIKE = 1.7
+# A face that hangs on one edge, and is longer than this many times the median edge, spans what it should not.
+FLAP = 5.0
 
 
 def closed(mesh: trimesh.Trimesh, tolerance: float = 0.0) -> trimesh.Trimesh | None:
@@ -62,6 +67,56 @@ def turn_outwards(mesh: trimesh.Trimesh) -> int:
     turned = (np.asarray(surface.faces) != before).any(axis=1)
     mesh.faces[turned] = mesh.faces[turned][:, ::-1]
     return int(turned.sum())
+
+
+def drop_flaps(mesh: trimesh.Trimesh) -> int:
+    """Take out, in place, the long faces that hang on the surface by one edge, or by none.
+
+    Such a face has a corner that belongs elsewhere; it leaves a hole of its own size.
+
+    Returns:
+      How many faces were taken out.
+    """
+    surface = _stitched(mesh)
+    points = np.asarray(surface.vertices)[surface.edges_sorted]
+    lengths = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
+    _, index, counts = np.unique(
+        surface.edges_sorted, axis=0, return_inverse=True, return_counts=True
+    )
+    alone = (counts[index.reshape(-1)] == 1).reshape(-1, 3)
+    long = lengths.reshape(-1, 3).max(axis=1) > FLAP * np.median(lengths)
+    flaps = (alone.sum(axis=1) >= 2) & long
+    if flaps.any() and not flaps.all():
+        mesh.update_faces(~flaps)
+        return int(flaps.sum())
+    return 0
+
+
+def spikes(mesh: trimesh.Trimesh) -> int:
+    """How many vertices stick out of the surface like needles, as one does whose number was damaged.
+
+    The tip of a cone is none: the edges that lead up to it are as long as those that end there.
+    """
+    surface = _stitched(mesh)
+    points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+    edges = np.asarray(surface.edges_unique)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    nearest, facing = np.full(len(points), np.inf), np.zeros(len(points))
+    total, degree = np.zeros(len(points)), np.zeros(len(points))
+    for own in edges.T:
+        np.minimum.at(nearest, own, lengths)
+        np.add.at(total, own, lengths)
+        np.add.at(degree, own, 1)
+    for corner in range(3):
+        own, after, before = (faces[:, (corner + k) % 3] for k in range(3))
+        np.maximum.at(facing, own, np.linalg.norm(points[after] - points[before], axis=1))
+    # Of the other edges at its neighbours, the mean length.
+    around = np.zeros(len(points))
+    for own, other in (edges.T, edges.T[::-1]):
+        np.add.at(around, own, (total[other] - lengths) / np.maximum(degree[other] - 1, 1))
+    around /= np.maximum(degree, 1)
+    # Where three faces meet the apex of a pyramid looks like a needle.
+    return int(((degree > 3) & (nearest > SPIKE * np.maximum(facing, around))).sum())
 
 
 def _stitched(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -15,7 +15,7 @@ from PIL import Image
 
 from asset_pipeline.assets import Provenance
 from asset_pipeline.labelling.label import ObjectType
-from asset_pipeline.repair import open_edges, turn_outwards
+from asset_pipeline.repair import drop_flaps, open_edges, spikes, turn_outwards
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -24,6 +24,9 @@ log = logging.getLogger(__name__)
 MAX_EXTENT = 3.0
 MIN_EXTENT = 0.003
 USUAL_EXTENT = (0.01, 1.0)  # a warning is due beyond
+# The least extent over the greatest, below which nothing is solid; a sheet of paper has 3e-4.
+FLATNESS = 1e-4
+MAX_EMPTY = 0.01  # of the faces without area; scans as published have 1e-4
 MAX_TEXTURE_PIXELS = 1024
 
 
@@ -95,13 +98,31 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
     assert isinstance(mesh, trimesh.Trimesh)
     mesh.vertices = np.asarray(mesh.vertices) * unit
     check_mesh(mesh, str(path), unit=unit)
+    if flaps := drop_flaps(mesh):
+        log.warning("%s: %d faces hung on the surface by one edge only; left out", path, flaps)
     if turned := turn_outwards(mesh):
         log.warning("%s: %d of %d faces pointed inwards; turned", path, turned, len(mesh.faces))
+    for doubt in _doubts(mesh):
+        log.warning("%s: %s; is the file damaged?", path, doubt)
     if holes := open_edges(mesh):
         log.warning(
             "%s: the surface has holes (%d open edges), filled for contacts and mass", path, holes
         )
     return mesh
+
+
+def _doubts(mesh: trimesh.Trimesh) -> list[str]:
+    """What no scan has as published, and numbers that were damaged bring about."""
+    found = []
+    count = len(mesh.faces)
+    empty = int(
+        (np.asarray(mesh.area_faces) <= 1e-12 * float(np.ptp(mesh.bounds, axis=0).max()) ** 2).sum()
+    )
+    if empty > MAX_EMPTY * count:
+        found.append(f"{empty} of {count} faces have no area")
+    if needles := spikes(mesh):
+        found.append(f"{needles} vertices stick out of the surface like needles")
+    return found
 
 
 def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
@@ -151,6 +172,10 @@ def check_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
         )
     if not float(mesh.area) > 0:
         raise InputError(flat)
+    if extents.min() < FLATNESS * extents.max():
+        raise InputError(
+            f"{where}: mesh is flat ({size} m); expected the surface of a solid object"
+        )
     if not USUAL_EXTENT[0] <= extents.max() <= USUAL_EXTENT[1]:
         log.warning("%s: mesh measures %s m, unusual for a tabletop object", where, size)
 
@@ -162,6 +187,8 @@ def write_texture(source: Path, target: Path) -> Path:
       InputError: `source` is missing or no image.
     """
     try:
+        with Image.open(source) as image:
+            image.verify()  # checksums, which reading the pixels leaves out
         with Image.open(source) as image:
             image = image.convert("RGB")
             image.thumbnail((MAX_TEXTURE_PIXELS, MAX_TEXTURE_PIXELS))

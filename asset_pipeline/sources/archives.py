@@ -196,6 +196,9 @@ def _tar_entries(archive: Path) -> Iterator[_Entry]:
                 return file
 
             yield _Entry(path, member.size, reader if member.isreg() else None)
+        # The checksum of the whole comes after the last member.
+        while tar.fileobj is not None and tar.fileobj.read(_CHUNK):
+            pass
 
 
 def _zip_entries(archive: Path) -> Iterator[_Entry]:

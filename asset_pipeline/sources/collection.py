@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -13,7 +14,11 @@ import trimesh
 
 from asset_pipeline.scan import ScanItem, load_scan_mesh, sha256
 from asset_pipeline.sources import archives
+from asset_pipeline.sources.ply_rows import check_rows
+from asset_pipeline.sources.wavefront_lines import read_lines
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 
 def find_items(
@@ -124,7 +129,9 @@ def unpacked(item: ScanItem, members: Collection[PurePosixPath]) -> Iterator[Pat
 
 
 def load_mesh(item: ScanItem, folder: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
-    """The item's mesh in metres; messages name the archive, not the folder it was unpacked into.
+    """The item's mesh in metres; errors name the archive, not the folder it was unpacked into.
+
+    The file is first read strictly, because the reader of meshes passes over what it does not understand.
 
     Args:
       item: The object.
@@ -134,8 +141,14 @@ def load_mesh(item: ScanItem, folder: Path, *, unit: float = 1.0) -> trimesh.Tri
     Raises:
       InputError: The mesh cannot be used.
     """
+    path = folder / item.member
     try:
-        return load_scan_mesh(folder / item.member, unit=unit)
+        if path.suffix.lower() == ".obj":
+            if doubts := read_lines(path, max_bytes=archives.MAX_FILE_BYTES).doubts:
+                log.warning("%s: %s", path, "; ".join(doubts))
+        elif path.suffix.lower() == ".ply":
+            check_rows(path)
+        return load_scan_mesh(path, unit=unit)
     except InputError as error:
         raise InputError(str(error).replace(str(folder), str(item.path))) from None
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +13,7 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.articulated_scan import LinkJoint, LinkRole, PartMesh, ScanLink, Surface
+from asset_pipeline.sources.mobility_record import Semantics, compare_size, pose_of
 from asset_pipeline.sources.urdf import Urdf, UrdfJoint
 from asset_pipeline.sources.wavefront import read_wavefront
 from manipose_mj.errors import InputError
@@ -26,15 +26,6 @@ MOVES = ("revolute", "prismatic", "continuous")
 MIN_TRAVEL = {"slide": 5e-4, "hinge": np.deg2rad(1.0)}  # [m, rad]; less is as good as fixed
 MAX_SIZE = 4.0  # [m]
 Side = Literal["depth", "width", "height"]
-
-
-@dataclass(frozen=True)
-class Semantics:
-    """A line of `semantics.txt`: how a link moves (hinge, slider, slider+, heavy, static, free) and
-    its name."""
-
-    motion: str
-    name: str
 
 
 def normalised_links(
@@ -61,7 +52,8 @@ def normalised_links(
         top = moving[0].child if moving else urdf.root
         if moving:
             joints[top] = moving[0]
-        groups.setdefault(top, []).extend(_parts(folder, urdf, link, _pose(chain)))
+        groups.setdefault(top, []).extend(_parts(folder, urdf, link, pose_of(chain)))
+    compare_size(folder, _drawn_bounds(urdf, groups))
     base = ScanLink("base", tuple(groups.pop(urdf.root, ())))
     if not base.parts:
         raise InputError(
@@ -74,9 +66,8 @@ def normalised_links(
             continue
         kind, role = joints[name].kind, _role(joints[name], semantics.get(name), parts)
         log.debug("%s: %s is a %s %s", folder, name, kind, role)
-        frame = _pose(urdf.chain(joints[name].parent)) @ joints[name].pose
+        frame = pose_of(urdf.chain(joints[name].parent)) @ joints[name].pose
         found.append(_shut(ScanLink(name, tuple(parts), None, role), joints[name], frame, base))
-    _compare_limits(folder, joints)
     return base, found
 
 
@@ -152,12 +143,15 @@ def _parts(folder: Path, urdf: Urdf, link: str, pose: Float[np.ndarray, "4 4"]) 
     return [PartMesh(re.sub(r"-\d+$", "", k), k, tuple(s)) for k, s in surfaces.items()]
 
 
-def _pose(chain: list[UrdfJoint]) -> Float[np.ndarray, "4 4"]:
-    """`T_root_link` with every joint at zero."""
-    pose = np.eye(4)
-    for joint in chain:
-        pose = pose @ joint.pose
-    return pose
+def _drawn_bounds(urdf: Urdf, groups: dict[str, list[PartMesh]]) -> Float[np.ndarray, "2 3"]:
+    """Of all meshes in the frame that they were drawn in, which the joint below the root turns."""
+    top = next((j.pose for j in urdf.joints.values() if j.parent == urdf.root), np.eye(4))
+    meshes = [p.mesh for parts in groups.values() for p in parts]
+    if not meshes:
+        raise InputError("no mesh is there; expected those that the URDF names")
+    points = [transform(np.linalg.inv(top), np.asarray(mesh.vertices)) for mesh in meshes]
+    return np.array([np.min([p.min(axis=0) for p in points], axis=0),
+                     np.max([p.max(axis=0) for p in points], axis=0)])  # fmt: skip
 
 
 def _role(joint: UrdfJoint, semantics: Semantics | None, parts: list[PartMesh]) -> LinkRole:
@@ -236,22 +230,3 @@ def _scaled(link: ScanLink, scale: float, foot: Float[np.ndarray, "3"]) -> ScanL
     travel = joint.travel * (scale if joint.kind == "slide" else 1.0)
     origin = scale * (joint.origin - foot)
     return replace(link, parts=parts, joint=replace(joint, origin=origin, travel=travel))
-
-
-def _compare_limits(folder: Path, joints: dict[str, UrdfJoint]) -> None:
-    """Warn where `mobility_v2.json`, which counts hinges in degrees, and the URDF disagree."""
-    try:
-        entries = json.loads((folder / "mobility_v2.json").read_text(encoding="utf-8"))
-        limits = {f"link_{e['id']}": e["jointData"]["limit"] for e in entries if e.get("jointData")}
-        for name, joint in joints.items():
-            if joint.limits is None or name not in limits or limits[name].get("noLimit"):
-                continue
-            span = abs(float(limits[name]["b"]) - float(limits[name]["a"]))
-            if joint.kind == "revolute":
-                span = np.deg2rad(span)
-            own = joint.limits[1] - joint.limits[0]
-            if abs(span - own) > 0.01 * max(span, own):
-                log.warning("%s: link %r moves by %g in the URDF, by %g in mobility_v2.json; the URDF's "
-                            "is taken", folder, name, own, span)  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        log.warning("%s/mobility_v2.json: limits cannot be compared (%s)", folder, error)

@@ -12,6 +12,7 @@ MIT, but models 693-1260 are Sketchfab's under CC BY 4.0, and 1165 and 1166 Grab
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -24,8 +25,11 @@ from asset_pipeline.assets import Provenance
 from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import Kind, kind_of
+from asset_pipeline.sources.ply_rows import read_header
 from asset_pipeline.sources.ply_texture import texture_name
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 SOURCE = "PACE"
 UNIT = 0.001  # [m]
@@ -69,7 +73,7 @@ def opened(item: ScanItem) -> Iterator[Scan]:
     with collection.unpacked(item, _files(item)) as folder:
         mesh = collection.load_mesh(item, folder, unit=UNIT)
         _check_size(item, np.ptp(mesh.vertices, axis=0), info)
-        texture = texture_name(folder / item.member)
+        texture = texture_name(read_header(folder / item.member), f"{item.path}: {item.member}")
         image = None if texture is None else (folder / item.member).with_name(texture)
         yield Scan(
             name=item.name,
@@ -143,6 +147,10 @@ def _check_size(item: ScanItem, extents: np.ndarray, info: dict[str, Any]) -> No
     try:
         size = UNIT * np.array([float(info[f"size_{axis}"]) for axis in "xyz"])
     except (KeyError, TypeError, ValueError):
+        log.warning(
+            "%s: %s states no size of object %d; the unit is taken to be millimetres",
+            item.path, INFO, _number(item),
+        )  # fmt: skip
         return
     if not np.allclose(extents, size, rtol=SIZE_TOLERANCE, atol=0.002):
         mesh, stated = (" x ".join(f"{1000 * e:.4g}" for e in s) for s in (extents, size))

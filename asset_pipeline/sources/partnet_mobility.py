@@ -21,7 +21,8 @@ from asset_pipeline.articulated_scan import ArticulatedScan, ScanLink
 from asset_pipeline.assets import Provenance
 from asset_pipeline.scan import ScanItem
 from asset_pipeline.sources import collection
-from asset_pipeline.sources.mobility_links import Semantics, normalised_links, placed_links
+from asset_pipeline.sources.mobility_links import normalised_links, placed_links
+from asset_pipeline.sources.mobility_record import Semantics, compare_links
 from asset_pipeline.sources.urdf import read_urdf
 from manipose_mj.errors import InputError
 
@@ -30,7 +31,7 @@ log = logging.getLogger(__name__)
 SOURCE = "PartNet-Mobility v2"
 LICENCE = "PartNet-Mobility terms of use: non-commercial research, no redistribution"
 URDF = "mobility.urdf"
-FILES = (URDF, "mobility_v2.json", "semantics.txt", "meta.json")
+FILES = (URDF, "mobility_v2.json", "semantics.txt", "meta.json", "bounding_box.json")
 
 
 @dataclass(frozen=True)
@@ -123,9 +124,9 @@ def _members(item: ScanItem) -> list[PurePosixPath]:
 def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:
     semantics = _semantics(folder)
     size = _size(folder, semantics)
-    base, moving = placed_links(
-        normalised_links(folder, read_urdf(folder / URDF), semantics), size.side, size.length
-    )
+    urdf = read_urdf(folder / URDF)
+    compare_links(folder, urdf, semantics)
+    base, moving = placed_links(normalised_links(folder, urdf, semantics), size.side, size.length)
     return ArticulatedScan(
         name=item.name,
         category=size.category,
@@ -152,8 +153,13 @@ def _semantics(folder: Path) -> dict[str, Semantics]:
     """What each link is: from `semantics.txt`, else from `mobility_v2.json`, else unknown."""
     text = folder / "semantics.txt"
     if text.is_file():
-        rows = [line.split() for line in text.read_text("utf-8", "replace").splitlines()]
-        return {r[0]: Semantics(r[1], r[2]) for r in rows if len(r) >= 3}
+        content = text.read_text("utf-8", "replace")
+        if not content.endswith("\n"):
+            log.warning("%s: does not end with a newline and may be cut off", text)
+        rows = [line.split() for line in content.splitlines()]
+        if odd := [" ".join(r) for r in rows if len(r) != 3]:
+            log.warning("%s: %r is not link, motion and name; left out", text, odd[0][:60])
+        return {r[0]: Semantics(r[1], r[2]) for r in rows if len(r) == 3}
     log.warning("%s: missing; links are told apart by mobility_v2.json", text)
     document = _json(folder / "mobility_v2.json")
     return {
@@ -168,6 +174,11 @@ def _size(folder: Path, semantics: dict[str, Semantics]) -> CategorySize:
     category = meta.get("model_cat") if isinstance(meta, dict) else None
     if category is None:
         category = next((BODIES[s.name] for s in semantics.values() if s.name in BODIES), None)
+        log.warning(
+            "%s: does not say the category; by semantics.txt it is %s",
+            folder / "meta.json",
+            category,
+        )
     if not isinstance(category, str) or category not in SIZES:
         raise InputError(
             f"{folder}: category {category!r} has no known size; known: {', '.join(SIZES)}"

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path, PurePosixPath
+import logging
+import re
 
-# Far more than any header; a file without `end_header` is not read whole.
-MAX_HEADER_LINES = 500
+from asset_pipeline.sources.ply_rows import PlyHeader
+from asset_pipeline.sources.references import leaves
+
+log = logging.getLogger(__name__)
 
 
-def texture_name(path: Path) -> str | None:
-    """The file name after `comment TextureFile`, without any folder; None if the header has none."""
-    with path.open("rb") as file:
-        for _ in range(MAX_HEADER_LINES):
-            line = file.readline(1000).decode("latin-1").strip()
-            if not line or line == "end_header":
-                return None
-            words = line.split(maxsplit=2)
-            if words[:2] == ["comment", "TextureFile"] and len(words) == 3:
-                return PurePosixPath(words[2].strip().replace("\\", "/")).name
+def texture_name(header: PlyHeader, where: str) -> str | None:
+    """The file name after `comment TextureFile`, without any folder; None if the header has none.
+
+    Args:
+      header: Of the PLY file.
+      where: Opens the warning about a name that leaves the folder.
+    """
+    for line in header.comments:
+        words = line.split(maxsplit=2)
+        if words[:2] == ["comment", "TextureFile"] and len(words) == 3:
+            name = words[2].strip()
+            if leaves(name):
+                log.warning("%s: it names %r, outside its folder, which is not opened", where, name)
+            return re.split(r"[/\\]", name)[-1]
     return None

@@ -6,6 +6,7 @@ built on YCB refer to it. https://www.ycbbenchmarks.com, CC BY 4.0.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,13 +21,17 @@ from asset_pipeline.labelling.label import ObjectType
 from asset_pipeline.scan import Scan, ScanItem, sha256
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of
+from asset_pipeline.sources.wavefront_materials import read_materials
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 SOURCE = "YCB, google_16k"
 LICENCE = "CC BY 4.0"
 SUFFIX = "_google_16k.tgz"
 MESH = Path("google_16k") / "textured.obj"
 TEXTURE = "texture_map.png"
+LIBRARY = "textured.mtl"
 
 
 @dataclass(frozen=True)
@@ -180,13 +185,18 @@ def opened(item: ScanItem) -> Iterator[Scan]:
     if len(found) != 1:
         raise InputError(f"{item.path}: holds {len(found)} meshes; expected one <id>/{MESH}")
     mesh = PurePosixPath(found[0])
-    with collection.unpacked(item, [mesh, mesh.with_name(TEXTURE)]) as folder:
+    wanted = [mesh, mesh.with_name(TEXTURE), mesh.with_name(LIBRARY)]
+    with collection.unpacked(item, wanted) as folder:
         yield _scan(item, folder, Path(mesh))
 
 
 def _scan(item: ScanItem, folder: Path, member: Path) -> Scan:
     mesh = collection.load_mesh(replace(item, member=str(member)), folder)
     texture = (folder / member).with_name(TEXTURE)
+    # Its only use: what it says must be what is taken anyway.
+    library = read_materials(texture.with_name(LIBRARY), texture.parent)
+    if texture.is_file() and not any(m.texture == texture for m in library.values()):
+        log.warning("%s: no material of %s has it; taken all the same", texture, LIBRARY)
     entry = OBJECTS.get(item.name) or _unlisted(item.name)
     return Scan(
         name=item.name,

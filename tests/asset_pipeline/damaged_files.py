@@ -6,16 +6,19 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scan_files as files
+import trimesh
 from hypothesis import strategies as st
 
 Files = dict[str, bytes]
 Draw = Callable[[Any], Any]
-SIZE = (0.08, 0.06, 0.12)
+SIZE = (0.11, 0.09, 0.12)  # too wide to grasp: quick
+FINE = 4  # subdivisions: 3,072 triangles of some 5 mm
 
 
 @dataclass(frozen=True)
@@ -49,31 +52,71 @@ class Case:
         return path
 
 
-def valid(source: str) -> Files:
-    """An undamaged object."""
-    box = files.box(SIZE)
+@lru_cache(maxsize=16)
+def valid(source: str, subdivisions: int = FINE) -> Files:
+    """An undamaged object, its files written as the publisher's are."""
+    box = scanned_box(subdivisions)
     if source == "ycb":
         home = "001_thing/google_16k/"
         return {
-            f"{home}textured.obj": files.obj(box),
-            f"{home}textured.mtl": b"newmtl material_0\nmap_Kd texture_map.png\n",
+            f"{home}textured.obj": obj(box, "textured.mtl", normals=True, counts=True),
+            f"{home}textured.mtl": b"newmtl material_0\n# shader_type beckmann\nmap_Kd texture_map.png\n\n",
             f"{home}texture_map.png": files.image(),
         }
     if source == "google_scanned_objects":
         home = "models/Thing/"
-        return {f"{home}model.obj": files.obj(box), f"{home}texture.png": files.image()}
+        return {
+            f"{home}model.obj": obj(box, "material_0.mtl").rstrip(b"\n"),
+            f"{home}texture.png": files.image(),
+        }
     if source == "omniobject3d":
         home = "raw_scans/box/box_001/Scan/Scan"
-        return {f"{home}.obj": files.obj(box.apply_scale(1000)), f"{home}.jpg": files.jpeg()}
+        return {f"{home}.obj": obj(box.apply_scale(1000), "Scan.mtl"), f"{home}.jpg": files.jpeg()}
     if source == "pace":
         size = {f"size_{axis}": 1000 * s for axis, s in zip("xyz", SIZE, strict=True)}
-        info = {"1": {"identifier": "box/001", "diameter": 156.0, **size}}
+        info = {"1": {"identifier": "box/001", "diameter": 185.9, **size}}
         return {
             "models/obj_000001.ply": files.meshlab_ply(box.apply_scale(1000), "obj_000001.png"),
             "models/obj_000001.png": files.image(),
             "models/models_info.json": json.dumps(info).encode(),
         }
     return _cabinet("dataset/4711/")
+
+
+def scanned_box(subdivisions: int) -> trimesh.Trimesh:
+    """A box in small triangles, as scans are: 12, times 4 for each subdivision."""
+    box = files.box(SIZE)
+    for _ in range(subdivisions):
+        box = box.subdivide()
+    return box
+
+
+def obj(
+    mesh: trimesh.Trimesh, library: str, *, normals: bool = False, counts: bool = False
+) -> bytes:
+    """As Wavefront OBJ: vertices, texture coordinates, normals where wanted, faces.
+
+    Args:
+      mesh: Flat-sided; each corner gets its face's normal.
+      library: The material library that it names.
+      normals: Whether to write them.
+      counts: Whether to open with comments that state the numbers of vertices and faces.
+    """
+    faces = np.asarray(mesh.faces) + 1
+    lines = [f"mtllib {library}"]
+    if counts:
+        lines = [f"# Vertices: {len(mesh.vertices)}", f"# Faces: {len(faces)}", *lines]
+    lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
+    lines += [f"vt {i / len(mesh.vertices):.4f} 0.5" for i in range(len(mesh.vertices))]
+    across = [""] * len(faces)
+    if normals:
+        rows, index = np.unique(np.round(mesh.face_normals, 6) + 0.0, axis=0, return_inverse=True)
+        lines += [f"vn {x:g} {y:g} {z:g}" for x, y, z in rows]
+        across = [f"/{i + 1}" for i in index.reshape(-1)]
+    lines.append("usemtl material_0")
+    for face, normal in zip(faces, across, strict=True):
+        lines.append("f " + " ".join(f"{i}/{i}{normal}" for i in face))
+    return ("\n".join(lines) + "\n").encode()
 
 
 SOURCES = ("ycb", "google_scanned_objects", "omniobject3d", "pace", "partnet_mobility")
@@ -88,9 +131,21 @@ URDF = """<?xml version="1.0"?>
 <joint name="joint_0" type="fixed"><origin rpy="1.5707963 0 -1.5707963" xyz="0 0 0"/>
   <child link="link_0"/><parent link="base"/></joint>
 <joint name="joint_1" type="revolute"><origin xyz="0.5 0 0.5"/><axis xyz="0 1 0"/>
-  <child link="link_1"/><parent link="link_0"/><limit lower="0" upper="1.57"/></joint>
+  <child link="link_1"/><parent link="link_0"/><limit lower="0" upper="1.5707963"/></joint>
 </robot>
 """
+MOBILITY = [
+    {
+        "id": 0, "parent": -1, "joint": "heavy", "name": "cabinet_frame",
+        "parts": [{"id": 0, "name": "body", "children": []}], "jointData": {},
+    },
+    {
+        "id": 1, "parent": 0, "joint": "hinge", "name": "cabinet_door",
+        "parts": [{"id": 1, "name": "cabinet_door_surface", "children": []}],
+        "jointData": {"axis": {"origin": [0.5, 0, 0.5], "direction": [0, 1, 0]},
+                      "limit": {"a": 0, "b": 90, "noLimit": False}},
+    },
+]  # fmt: skip
 
 
 def _cabinet(home: str) -> Files:
@@ -99,29 +154,30 @@ def _cabinet(home: str) -> Files:
     door.apply_translation([0, 0, 0.5])
     return {
         f"{home}mobility.urdf": URDF.encode(),
-        f"{home}textured_objs/original-0.obj": files.obj(body),
-        f"{home}textured_objs/original-1.obj": files.obj(door),
-        f"{home}textured_objs/material.mtl": b"newmtl material_0\nmap_Kd ../images/wood.png\n",
+        f"{home}textured_objs/original-0.obj": obj(body, "material.mtl", normals=True),
+        f"{home}textured_objs/original-1.obj": obj(door, "material.mtl", normals=True),
+        f"{home}textured_objs/material.mtl": b"newmtl material_0\nKd 1 1 1\nmap_Kd ../images/wood.png\n",
         f"{home}images/wood.png": files.image(),
         f"{home}semantics.txt": b"link_0 heavy furniture_body\nlink_1 hinge rotation_door\n",
         f"{home}meta.json": b'{"model_cat": "StorageFurniture"}',
-        f"{home}mobility_v2.json": b'[{"id": 1, "jointData": {"limit": {"a": 0, "b": 90}}}]',
+        f"{home}mobility_v2.json": json.dumps(MOBILITY).encode(),
+        f"{home}bounding_box.json": b'{"min": [-0.5, -0.45, -0.5], "max": [0.5, 0.45, 0.55]}',
     }
 
 
 @st.composite
-def cases(draw: Draw, sources: tuple[str, ...] = SOURCES) -> Case:
+def cases(draw: Draw, sources: tuple[str, ...] = SOURCES, subdivisions: int = FINE) -> Case:
     """A damaged data set."""
     source = draw(st.sampled_from(sources))
-    content = valid(source)
+    whole = valid(source, subdivisions)
     damages = ANY | (URDFS if source == "partnet_mobility" else {})
     damage = draw(st.sampled_from(sorted(damages)))
-    content = damages[damage](draw, content)
+    content = damages[damage](draw, whole)
     packed = [".tgz"] if source == "ycb" else [".zip", ".tgz"]
     # Only an archive can hold a file that is not below it.
     archive = draw(st.sampled_from(packed if damage == "path escape" else ["", *packed]))
     if archive and damage == "truncated" and draw(st.booleans()):
-        return Case(source, "truncated archive", valid(source), archive, draw(st.floats(0, 0.999)))
+        return Case(source, "truncated archive", whole, archive, draw(st.floats(0, 0.999)))
     return Case(source, damage, content, archive)
 
 
@@ -132,16 +188,27 @@ def _some(draw: Draw, content: Files, ending: str) -> str:
 MESH = r"\.(obj|ply)$"
 
 
+def _dice(draw: Draw) -> np.random.Generator:
+    """For places in a file: hypothesis itself likes the first and the last ones too much."""
+    return np.random.default_rng(draw(st.integers(0, 10**6)))
+
+
 def _truncated(draw: Draw, content: Files) -> Files:
     name = _some(draw, content, "")
-    return content | {name: content[name][: draw(st.integers(0, len(content[name]) - 2))]}
+    return content | {name: content[name][: _dice(draw).integers(0, len(content[name]) - 1)]}
 
 
 def _flipped(draw: Draw, content: Files) -> Files:
+    """Bytes become others; in half of the cases digits only, so that numbers stay numbers."""
     name = _some(draw, content, "")
-    data = bytearray(content[name])
-    for place in draw(st.lists(st.integers(0, len(data) - 1), min_size=1, max_size=20)):
-        data[place] ^= draw(st.integers(1, 255))
+    data, dice = bytearray(content[name]), _dice(draw)
+    digits = [i for i, byte in enumerate(data) if 48 <= byte <= 57]
+    if draw(st.booleans()) and digits and not re.search("png|jpg", name):
+        for place in dice.choice(digits, dice.integers(1, 4)):
+            data[place] = 48 + (data[place] - 48 + dice.integers(1, 10)) % 10
+    else:
+        for place in dice.integers(0, len(data), dice.integers(1, 20)):
+            data[place] ^= dice.integers(1, 256)
     return content | {name: bytes(data)}
 
 
@@ -330,7 +397,7 @@ URDFS: dict[str, Callable[[Draw, Files], Files]] = {
         "textured_objs/original-1.obj", "textured_objs/original-9.obj", "textured_objs"
     ),
     "URDF number": _urdf(
-        'upper="1.57"', 'upper="nan"', 'upper="-9"', 'upper="1e300"', 'upper=""', 'upper="1e9"'
+        'upper="1.5707963"', 'upper="nan"', 'upper="-9"', 'upper="1e300"', 'upper=""', 'upper="1e9"'
     ),
     "URDF axis": _urdf(
         '<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', '<axis xyz="1"/>', '<axis xyz="inf 0 0"/>'

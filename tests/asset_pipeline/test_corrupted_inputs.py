@@ -17,7 +17,7 @@ from asset_pipeline.scan import Scan
 from manipose_mj.errors import InputError
 
 QUICK = settings(
-    max_examples=150,
+    max_examples=100,
     deadline=None,
     derandomize=True,
     database=None,
@@ -48,12 +48,12 @@ def test_undamaged_objects_are_read_without_a_warning(tmp_path, source, archive,
     root = Case(source, "none", valid(source), archive).write(tmp_path)
     with caplog.at_level(logging.WARNING):
         (scan,) = _read(source, root)
-    assert not [r for r in caplog.records if "mobility_v2" not in r.getMessage()]
+    assert not caplog.records
     assert scan.provenance.inputs
 
 
 @QUICK
-@given(case=cases())
+@given(case=cases(subdivisions=2))
 def test_damage_is_refused_by_name_or_leaves_something_sound(case):
     with tempfile.TemporaryDirectory() as folder:
         root = case.write(Path(folder) / "in")
