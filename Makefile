@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench conformance clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/manipose demo --out demo_report
@@ -21,6 +21,11 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/manipulation_table.py
 	$(BIN)/python benchmarks/throughput.py
 
+# Checkers of other libraries, and 2,000 random steps of every task; brings PyTorch.
+conformance: $(VENV)/.conformance
+	$(BIN)/python -m pytest tests/conformance
+	$(BIN)/python benchmarks/random_steps.py
+
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
@@ -30,6 +35,10 @@ $(VENV)/.runtime: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/.dev: $(VENV)/.runtime
 	$(PIP) --editable ".[dev]"
+	touch $@
+
+$(VENV)/.conformance: $(VENV)/.dev
+	$(PIP) --editable ".[conformance]"
 	touch $@
 
 clean:

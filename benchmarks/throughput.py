@@ -1,69 +1,192 @@
-"""Print how fast the tasks reset, step and see on one core of this machine.
+"""Print how fast the tasks reset, step and see on one core, beside other benchmarks' tasks.
 
-python benchmarks/throughput.py
+python benchmarks/throughput.py [--only TASK ...] [--episodes N]
+
+All in one run: compare ratios. Others are measured where they are installed: dm_control's
+`stack_2_bricks_features` (always), Gymnasium-Robotics' FetchPickAndPlace, robosuite's Lift. Every
+environment is stepped with state observations under small random actions, ten control steps at a time in
+turn with the others, so that a busy machine slows all alike; the median is reported.
 """
 
 from __future__ import annotations
 
+import argparse
 import functools
+import importlib.util
 import platform
+import resource
 import statistics
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from dm_control import manipulation
 
 from manipose_mj import suite
 from manipose_mj.evaluation.statistics import machine
-from manipose_mj.mjcf.ray_camera import RayCamera
+from manipose_mj.tasks.observations import SensorConfig
 
 RESETS = 30
-STEPS = 500
-IMAGES = 50
+TURNS, STEPS = 40, 10
+CLOUDS = 20
+REFERENCE = "dm_control stack_2_bricks_features"
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Attributes: name; step, one control step; substeps, physics steps in it; reset."""
+
+    name: str
+    step: Callable[[], object]
+    substeps: int
+    reset: Callable[[], object]
 
 
 def main() -> None:
-    """Print one row per task."""
+    """Print a row for each environment, then the cloud's time, then growth over many episodes."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="+", default=[], help="domain/task")
+    parser.add_argument("--episodes", type=int, default=0, help="look for growth over so many")
+    arguments = parser.parse_args()
+    tasks = [t for t in suite.ALL_TASKS if not arguments.only or "/".join(t) in arguments.only]
     print(f"{machine()}; Python {platform.python_version()}, MuJoCo {mujoco.__version__}")
-    print(
-        "| task | reset [ms] | physics steps/s, environment | physics steps/s, bare | depth 160x120 [ms] |"
-    )
-    print("| --- | --- | --- | --- | --- |")
-    for domain, task in suite.ALL_TASKS:
-        environment = suite.load(domain, task, seed=0)
-        resets = [_milliseconds(environment.reset) for _ in range(RESETS)]
-        action = _hold(environment)
-        substeps = environment.task.physics_steps_per_control_step
-
-        started = time.perf_counter()
-        for _ in range(STEPS):
-            environment.step(action)
-        stepped = STEPS * substeps / (time.perf_counter() - started)
-
-        model, data = environment.physics.model.ptr, environment.physics.data.ptr
-        started = time.perf_counter()
-        mujoco.mj_step(model, data, STEPS * substeps)
-        bare = STEPS * substeps / (time.perf_counter() - started)
-
-        camera = RayCamera(120, 160)
-        camera.render(model, data, "front")
-        draw = functools.partial(camera.render, model, data, "front")
-        images = [_milliseconds(draw) for _ in range(IMAGES)]
+    runners = [_reference(), *_others(), *(_ours(*task) for task in tasks)]
+    for runner in runners:
+        runner.reset()
+    rates = _rates(runners)
+    print("| environment | reset, median [ms] | physics steps/s | of dm_control's |")
+    print("| --- | --- | --- | --- |")
+    for runner in runners:
+        resets = [_milliseconds(runner.reset) for _ in range(RESETS)]
+        share = rates[runner.name] / rates[REFERENCE]
         print(
-            f"| `{domain}/{task}` | {statistics.median(resets):.1f} | {stepped:,.0f} | {bare:,.0f} "
-            f"| {statistics.median(images):.1f} |"
+            f"| {runner.name} | {statistics.median(resets):.0f} | {rates[runner.name]:,.0f} | {share:.2f} |"
         )
+    print("| task | cloud of 3 cameras at 160x120, no GL [ms] |")
+    print("| --- | --- |")
+    for task in tasks:
+        print(f"| {'/'.join(task)} | {_cloud(*task):.1f} |")
+    if arguments.episodes:
+        for task in tasks:
+            _growth(task, arguments.episodes)
 
 
-def _hold(environment) -> np.ndarray:
+def _rates(runners: list[Runner]) -> dict[str, float]:
+    """Physics steps a second, the median of all turns."""
+    seconds: dict[str, list[float]] = {runner.name: [] for runner in runners}
+    for _ in range(TURNS):
+        for runner in runners:
+            started = time.perf_counter()
+            for _ in range(STEPS):
+                runner.step()
+            seconds[runner.name].append(time.perf_counter() - started)
+    return {r.name: STEPS * r.substeps / statistics.median(seconds[r.name]) for r in runners}
+
+
+def _ours(domain: str, task: str) -> Runner:
+    environment = suite.load(domain, task, seed=0, observations="state")
+    environment.reset()
     joints, opening = environment.task.robot.configuration(environment.physics)
-    return np.append(joints, opening)
+    home, rng = np.append(joints, opening), np.random.default_rng(0)
+    limits = environment.action_spec()
+
+    def step() -> None:
+        action = home + rng.normal(0, 0.05, 8) * ([1.0] * 7 + [0.2])
+        environment.step(np.clip(action, limits.minimum, limits.maximum))
+
+    substeps = environment.task.physics_steps_per_control_step
+    return Runner(f"{domain}/{task}", step, substeps, environment.reset)
 
 
-def _milliseconds(call) -> float:
+def _reference() -> Runner:
+    environment = manipulation.load("stack_2_bricks_features", seed=0)
+    environment.reset()
+    limits, rng = environment.action_spec(), np.random.default_rng(0)
+
+    def step() -> None:
+        # Velocities, of which the whole range would throw the bricks about.
+        environment.step(rng.uniform(0.2 * limits.minimum, 0.2 * limits.maximum))
+
+    return Runner(
+        REFERENCE, step, environment.task.physics_steps_per_control_step, environment.reset
+    )
+
+
+def _others() -> list[Runner]:
+    found = []
+    if importlib.util.find_spec("gymnasium_robotics"):
+        import gymnasium
+        import gymnasium_robotics
+
+        gymnasium.register_envs(gymnasium_robotics)
+        fetch = gymnasium.make("FetchPickAndPlace-v4")
+        step = functools.partial(_gym_step, fetch)
+        substeps = fetch.unwrapped.n_substeps
+        found.append(Runner("Gymnasium-Robotics FetchPickAndPlace", step, substeps, fetch.reset))
+    if importlib.util.find_spec("robosuite"):
+        import robosuite
+
+        lift = robosuite.make(
+            "Lift", robots="Panda", has_renderer=False, use_camera_obs=False,
+            has_offscreen_renderer=False,
+        )  # fmt: skip
+        low, high = lift.action_spec
+        rng = np.random.default_rng(0)
+        substeps = round(lift.control_timestep / lift.model_timestep)
+        found.append(
+            Runner(
+                "robosuite Lift",
+                lambda: lift.step(rng.uniform(0.2 * low, 0.2 * high)),
+                substeps,
+                lift.reset,
+            )
+        )
+    return found
+
+
+def _gym_step(environment) -> None:
+    if any(environment.step(0.2 * environment.action_space.sample())[2:4]):
+        environment.reset()
+
+
+def _cloud(domain: str, task: str) -> float:
+    """Median time of the fused cloud [ms], every time of another moment."""
+    environment = suite.load(
+        domain, task, seed=0, observations="pointcloud", sensors=SensorConfig(height=120, width=160)
+    )
+    environment.reset()
+    joints, opening = environment.task.robot.configuration(environment.physics)
+    blind = suite.load(domain, task, seed=0, observations="state")
+    blind.reset()
+    action, taken = np.append(joints, opening), []
+    for _ in range(CLOUDS):
+        with_cloud = _milliseconds(functools.partial(environment.step, action))
+        taken.append(with_cloud - _milliseconds(functools.partial(blind.step, action)))
+    return statistics.median(taken)
+
+
+def _growth(task: tuple[str, str], episodes: int) -> None:
+    """Print how reset times and memory change over many episodes."""
+    environment = suite.load(*task, seed=0, observations="state")
+    environment.reset()
+    resets, memory = [], []
+    for _ in range(episodes):
+        resets.append(_milliseconds(environment.reset))
+        memory.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    tenth = max(1, episodes // 10)
+    first, last = statistics.median(resets[:tenth]), statistics.median(resets[-tenth:])
+    print(
+        f"{'/'.join(task)}: {episodes} episodes, reset {first:.1f} ms in the first tenth, "
+        f"{last:.1f} ms in the last; peak memory {memory[tenth]:.0f} MB, then {memory[-1]:.0f} MB"
+    )
+
+
+def _milliseconds(work: Callable[[], object]) -> float:
     started = time.perf_counter()
-    call()
-    return 1e3 * (time.perf_counter() - started)
+    work()
+    return (time.perf_counter() - started) * 1e3
 
 
 if __name__ == "__main__":

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from manipose_mj.tasks.registry import register_task as register_task
+
 __version__ = "0.1.0"
 
 
@@ -12,4 +17,12 @@ def register_suite() -> None:
     register()
 
 
-__all__ = ["__version__", "register_suite"]
+def __getattr__(name: str) -> Any:
+    if name == "register_task":  # loads the simulator, which `import manipose_mj` does not
+        from manipose_mj.tasks.registry import register_task
+
+        return register_task
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+__all__ = ["__version__", "register_suite", "register_task"]

@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
+import dm_env
 import numpy as np
 from dm_control import composer
 
 from asset_pipeline.assets import Asset
 from asset_pipeline.catalogue import Split
+from manipose_mj.errors import unknown_name
 from manipose_mj.tasks import builtin  # noqa: F401  (registers the tasks)
+from manipose_mj.tasks.environment import TaskEnvironment
 from manipose_mj.tasks.observations import SensorConfig
 from manipose_mj.tasks.options import Reward, TaskOptions
-from manipose_mj.tasks.registry import all_tasks, task_spec
+from manipose_mj.tasks.registry import TaskSpec, all_tasks, on_registration, task_spec
 
-ALL_TASKS: tuple[tuple[str, str], ...] = all_tasks()
+ALL_TASKS: tuple[tuple[str, str], ...]  # always those of now: see __getattr__
+
+
+def __getattr__(name: str) -> Any:
+    if name == "ALL_TASKS":
+        return all_tasks()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def load(
@@ -26,6 +36,7 @@ def load(
     *,
     observations: str = "state+pose",
     sensors: SensorConfig | None = None,
+    control_mode: str = "pd_joint_pos",
     objects: Sequence[Asset] | None = None,
     split: Split = "train",
     reward: Reward = "sparse",
@@ -35,11 +46,13 @@ def load(
     """The environment of a registered task.
 
     Args:
-      domain: `"single_object"` or `"articulated"`.
+      domain: `"single_object"`, `"clutter"`, `"articulated"`, or one of your own.
       task: A task of that domain, as in `ALL_TASKS`.
       seed: Of the environment's one random state; episodes follow from it.
-      observations: Any `+` combination of `state`, `pose`, `depth`, `segmentation`, `pointcloud`.
+      observations: Any `+` combination of observation modes, such as `"state+pose+pointcloud"`.
       sensors: Cameras, image size and cloud size.
+      control_mode: What actions mean, such as `"pd_joint_pos"`, `"pd_ee_delta_pose"` or `"primitive"`;
+        the physics is the same for all.
       objects: Assets to use instead of the built-in ones.
       split: Which built-in objects, train or test.
       reward: `"sparse"` or `"dense"`.
@@ -47,24 +60,64 @@ def load(
       environment_kwargs: More arguments of `composer.Environment`.
 
     Raises:
-      InputError: An unknown task or observation mode, or objects that the task cannot use.
+      InputError: An unknown task, observation or control mode, or objects that the task cannot use.
     """
-    options = TaskOptions(
+    spec = task_spec(domain, task)
+    return load_spec(
+        spec,
+        seed,
         observations=observations,
         sensors=sensors or SensorConfig(),
+        control_mode=control_mode,
         objects=None if objects is None else tuple(objects),
         split=split,
         reward=reward,
         randomisation=randomisation,
+        environment_kwargs=environment_kwargs or {},
     )
-    built = task_spec(domain, task).factory(options)
+
+
+def load_spec(
+    spec: TaskSpec,
+    seed: int | np.random.RandomState | None,
+    *,
+    control_mode: str,
+    environment_kwargs: dict[str, Any],
+    **options: Any,
+) -> composer.Environment:
+    """The environment of a task that need not be registered in this process; arguments as for `load`."""
+    from manipose_mj.control.modes import CONTROL_MODES
+    from manipose_mj.control.modes import control_mode as mode_named
+
+    if control_mode not in (*CONTROL_MODES, "primitive"):
+        raise unknown_name("control mode", control_mode, (*CONTROL_MODES, "primitive"))
+    if control_mode == "primitive":
+        from manipose_mj.control.modes.primitive import PrimitiveEnvironment
+
+        moving = load_spec(
+            spec,
+            seed,
+            control_mode="pd_joint_pos",
+            environment_kwargs=environment_kwargs,
+            **options,
+        )
+        return PrimitiveEnvironment(moving)
+    task = spec.factory(TaskOptions(action_mode=mode_named(control_mode), **options))
+    again = partial(
+        load_spec,
+        spec,
+        None,
+        control_mode=control_mode,
+        environment_kwargs=environment_kwargs,
+        **options,
+    )
     arguments: dict[str, Any] = {
-        "time_limit": built.config.horizon,
+        "time_limit": task.config.horizon,
         "random_state": seed,
         "strip_singleton_obs_buffer_dim": True,
         "recompile_mjcf_every_episode": False,
     }
-    return composer.Environment(built, **{**arguments, **(environment_kwargs or {})})
+    return TaskEnvironment(task, rebuild=again, **{**arguments, **environment_kwargs})
 
 
 def describe(domain: str, task: str) -> str:
@@ -73,22 +126,28 @@ def describe(domain: str, task: str) -> str:
 
 
 def register_suite() -> None:
-    """Make `dm_control.suite.load(domain, task)` know our tasks; calling it again changes nothing."""
+    """Make `dm_control.suite.load(domain, task)` know our tasks, and those registered later.
+
+    Calling it again changes nothing.
+    """
+    on_registration(_add_to_dm_control)
+
+
+def _add_to_dm_control(spec: TaskSpec) -> None:
     from dm_control import suite as dm_suite
     from dm_control.utils import containers
 
-    for domain in {domain for domain, _ in ALL_TASKS}:
-        tasks = containers.TaggedTasks()
-        for name in [name for other, name in ALL_TASKS if other == domain]:
-            tasks.add(*task_spec(domain, name).tags)(_suite_factory(domain, name))
-        module: Any = types.ModuleType(f"{__name__}.{domain}")
-        module.SUITE = tasks
-        dm_suite._DOMAINS[domain] = module
-    ours = tuple(task for task in ALL_TASKS if task not in dm_suite.ALL_TASKS)
-    dm_suite.ALL_TASKS = (*dm_suite.ALL_TASKS, *ours)
+    module: Any = dm_suite._DOMAINS.get(spec.domain)
+    if module is None:
+        module = types.ModuleType(f"{__name__}.{spec.domain}")
+        module.SUITE = containers.TaggedTasks()
+        dm_suite._DOMAINS[spec.domain] = module
+    module.SUITE.add(*spec.tags)(_suite_factory(spec))
+    dm_suite.ALL_TASKS = (*dm_suite.ALL_TASKS, (spec.domain, spec.name))
+    dm_suite.TASKS_BY_DOMAIN[spec.domain] = tuple(module.SUITE)
 
 
-def _suite_factory(domain: str, name: str) -> Any:
+def _suite_factory(spec: TaskSpec) -> Any:
     """A factory with the signature that `dm_control.suite` calls."""
 
     def factory(
@@ -96,11 +155,11 @@ def _suite_factory(domain: str, name: str) -> Any:
         random: int | np.random.RandomState | None = None,
         environment_kwargs: dict[str, Any] | None = None,
         **task_kwargs: Any,
-    ) -> composer.Environment:
+    ) -> dm_env.Environment:
         more = dict(environment_kwargs or {})
         if time_limit is not None:
             more["time_limit"] = time_limit
-        return load(domain, name, random, environment_kwargs=more, **task_kwargs)
+        return load(spec.domain, spec.name, random, environment_kwargs=more, **task_kwargs)
 
-    factory.__name__ = name
+    factory.__name__ = spec.name
     return factory

@@ -28,7 +28,14 @@ FORBIDDEN = {
         "manipose_mj.cli",
         "manipose_mj.suite",
     ),
-    "manipose_mj/control": ("manipose_mj.cli", "benchmarks"),
+    "manipose_mj/control": (
+        "manipose_mj.cli",
+        "manipose_mj.evaluation.runner",
+        "manipose_mj.gym",
+        "benchmarks",
+    ),
+    "manipose_mj/gym": ("manipose_mj.cli", "manipose_mj.evaluation", "benchmarks"),
+    "manipose_mj/protocol/frozen.py": ("mujoco", "dm_control", "manipose_mj.tasks"),
     "manipose_mj/evaluation": ("manipose_mj.cli", "benchmarks"),
 }
 

@@ -41,10 +41,16 @@ def all_names() -> list[str]:
     return [name for name, _ in catalogue.entries()]
 
 
-def names_in_tasks() -> list[str]:
-    """Of the built-in objects that the registered tasks put into their scenes."""
-    from asset_pipeline.catalogue import CATALOGUE
-    from manipose_mj.tasks.builtin import TARGET_POSE_OBJECTS
+def names_in_tasks(tasks: Sequence[str], split: str = "train") -> list[str]:
+    """Of the built-in objects that tasks put into their scenes.
 
-    drawn = (*TARGET_POSE_OBJECTS, ("cabinet", 0))
-    return [CATALOGUE[category].instance(index) for category, index in drawn]
+    Args:
+      tasks: `"domain/task"` names; those of other packages look after their objects themselves.
+      split: Which of the two sets of objects.
+    """
+    from manipose_mj import protocol
+
+    frozen = protocol.load(protocol.VERSIONS[-1]).tasks
+    fields = [frozen[task] for task in tasks if task in frozen]
+    names = (f.train_objects if split == "train" else f.test_objects for f in fields)
+    return sorted({name for each in names for name in each})

@@ -16,7 +16,7 @@ def evaluate(
     tasks: Annotated[Positional[tuple[str, ...]], arg(metavar="TASK...", help_behavior_hint="")],
     /,
     *,
-    episodes: int = 50,
+    episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
     seed: int = 0,
     pose: Literal["oracle"] = "oracle",
     jobs: int = CORES,
@@ -26,12 +26,13 @@ def evaluate(
     object_name: Annotated[
         str | None, arg(name="object", metavar="NAME", help_behavior_hint="")
     ] = None,
+    protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
 
     Args:
       tasks: Tasks to run, as `manipose list` names them.
-      episodes: Episodes per task.
+      episodes: Episodes per task; by default 50, or all 100 of a protocol.
       seed: Base seed; each episode derives its own from it.
       pose: Where the baseline takes object poses from.
       jobs: Episodes at the same time, one core each; results do not depend on it.
@@ -39,20 +40,25 @@ def evaluate(
       resume: Go on with the results in --out after an interruption.
       assets: Folder of built assets to take objects from instead of the built-in ones.
       object_name: The one object to manipulate, by its asset's name.
+      protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
     from manipose_mj.evaluation.config import EvaluationConfig
+    from manipose_mj.protocol.frozen import EPISODES
 
     if out is None:
         if resume:
             raise InputError("--resume needs --out: the folder whose evaluation goes on")
         out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
-    config = EvaluationConfig(tasks, out, episodes, seed, pose, jobs, assets, object_name)
+    if episodes is None:
+        episodes = EPISODES if protocol else 50
+    config = EvaluationConfig(tasks, out, episodes, seed, pose, jobs, assets, object_name, protocol)
     check_names(tasks, assets, object_name)
     if assets is None:
         # Once and here: workers would each build the same.
-        load_objects([object_name] if object_name else names_in_tasks(), jobs)
+        names = [object_name] if object_name else names_in_tasks(tasks, config.split)
+        load_objects(names, jobs)
     return run_and_report(config, resume=resume)
 
 

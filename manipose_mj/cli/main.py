@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import assets, demo, doctor, evaluate, pose, render, tasks
+from manipose_mj.cli import assets, demo, doctor, evaluate, pose, render, tasks, view
 from manipose_mj.cli.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
@@ -25,6 +25,7 @@ def build_app() -> SubcommandApp:
     app.command(evaluate.evaluate)
     app.command(name="list")(tasks.list_tasks)
     app.command(render.render)
+    app.command(view.view)
     app.command(assets.build_app(), name="assets", help="Build, check and inspect object assets.")
     app.command(pose.build_app(), name="pose", help="Train and evaluate pose estimators.")
     app.command(doctor.doctor)

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from dm_control import mjcf
 
-from manipose_mj.control.planning_scene import PlanningScene, subtree_geoms
+from manipose_mj.control.planning_scene import PlanningScene, forbid_sleep, subtree_geoms
 
 _ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 
@@ -40,6 +40,7 @@ class ArmModel:
             if not geom.contype and not geom.conaffinity:
                 spec.delete(geom)
         self.model = spec.compile()
+        forbid_sleep(self.model)
         self.tcp = f"{prefix}/tcp"
         self._robot_body = self.model.body(f"{prefix}/").id
         self.robot_geoms = subtree_geoms(self.model, self._robot_body)

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float
 
-from asset_pipeline.assets import Cavity, GraspSet, Joint
+from asset_pipeline.assets import Cavity, GraspSet, Joint, StablePose
 from asset_pipeline.labelling.label import PoseLabel
 
 
@@ -27,6 +27,7 @@ class ObjectBelief:
       grasps: In the object frame.
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
+      rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
     """
 
     name: str
@@ -35,6 +36,7 @@ class ObjectBelief:
     grasps: GraspSet
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
+    rests: tuple[StablePose, ...] = ()
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from dm_control import composer
-from dm_control.rl.control import PhysicsError
 
 from asset_pipeline.asset_json import list_assets, read_asset
 from asset_pipeline.assets import Asset
+from asset_pipeline.catalogue import Split
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.failure import StageFailure
@@ -32,6 +33,7 @@ def run_episode(
     pose: str = "oracle",
     assets: Path | None = None,
     object_name: str | None = None,
+    split: Split = "train",
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -42,6 +44,7 @@ def run_episode(
       pose: Where object poses come from: `"oracle"`.
       assets: Folder of built assets to take the object from.
       object_name: Which asset of that folder, or of the built-in catalogue.
+      split: Which built-in objects, train or test.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
@@ -49,7 +52,7 @@ def run_episode(
     if pose not in POSE_SOURCES:
         raise unknown_name("pose source", pose, POSE_SOURCES)
     started = time.perf_counter()
-    environment, baseline = _environment(task, assets, object_name)
+    environment, baseline = _environment(task, assets, object_name, split)
     judge = _reset(environment, seed)
     baseline.status = ""  # the generator below resets it too late for the first record
     recorder = _Recorder(environment, baseline)
@@ -63,11 +66,11 @@ def run_episode(
             recorder.after_step(steps)
             if last:
                 failure = StageFailure("timeout", f"not done after {judge.config.horizon:.0f} s")
+                if environment.failure:
+                    failure = StageFailure("physics", environment.failure_reason)
                 break
     except StageFailure as gave_up:
         failure = gave_up
-    except PhysicsError as error:
-        failure = StageFailure("physics", str(error).splitlines()[0])
     physics = environment.physics
     success = judge.succeeded(physics) and (failure is None or failure.stage != "physics")
     if failure is None and not success:
@@ -95,19 +98,22 @@ def run_episode(
 
 
 def start_state(
-    task: str, *, seed: int, assets: Path | None = None, object_name: str | None = None
+    task: str,
+    *,
+    seed: int,
+    assets: Path | None = None,
+    object_name: str | None = None,
+    split: Split = "train",
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The model and the state in which the episode of this seed starts."""
-    environment, _ = _environment(task, assets, object_name)
+    """The model and the state in which the episode of this seed starts; arguments as for an episode."""
+    environment, _ = _environment(task, assets, object_name, split)
     _reset(environment, seed)
     return environment.physics.model.ptr, environment.physics.data.ptr
 
 
-def scene_model(
-    task: str, *, seed: int, assets: Path | None = None, object_name: str | None = None
-) -> mujoco.MjModel:
+def scene_model(task: str, *, seed: int, **options: Any) -> mujoco.MjModel:
     """The model with everything where the episode of this seed has it, to draw a trajectory in."""
-    return start_state(task, seed=seed, assets=assets, object_name=object_name)[0]
+    return start_state(task, seed=seed, **options)[0]
 
 
 class _Recorder:
@@ -138,15 +144,25 @@ def _reset(environment: composer.Environment, seed: int) -> ManipulationTask:
     return environment.task
 
 
+def load_environment(
+    task: str,
+    *,
+    assets: Path | None = None,
+    object_name: str | None = None,
+    split: Split = "train",
+) -> composer.Environment:
+    """The environment in which episodes take place; arguments as for an episode."""
+    domain, _, name = task.partition("/")
+    objects = _objects(assets, object_name)
+    return suite.load(domain, name, seed=0, observations="state", objects=objects, split=split)
+
+
 @lru_cache(maxsize=4)
 def _environment(
-    task: str, assets: Path | None, object_name: str | None
+    task: str, assets: Path | None, object_name: str | None, split: Split
 ) -> tuple[composer.Environment, Baseline]:
     """Compiled once per process and scene."""
-    domain, _, name = task.partition("/")
-    environment = suite.load(
-        domain, name, seed=0, observations="state", objects=_objects(assets, object_name)
-    )
+    environment = load_environment(task, assets=assets, object_name=object_name, split=split)
     environment.reset()
     return environment, Baseline(environment)
 

@@ -22,11 +22,13 @@ _SQUEEZE = 0.15  # for the grip force to build up [s]
 class Executor:
     """Remembers the last command and yields the next ones; reads proprioception in between."""
 
-    def __init__(self, senses: Senses, timestep: float) -> None:
-        """Takes the robot as it is; `timestep` is the control step [s]."""
+    def __init__(self, senses: Senses, timestep: float, command: Action | None = None) -> None:
+        """Goes on from the last `command`, or from the robot as it is; control steps are `timestep` [s]."""
         self._senses = senses
         self.timestep = timestep
-        self._joints, self._opening = senses.robot()
+        joints, opening = senses.robot()
+        self._joints = joints if command is None else command[:7]
+        self._opening = opening if command is None else float(command[7])
 
     def perceive(self) -> Belief:
         """A fresh belief."""

@@ -1,4 +1,4 @@
-"""Grasps in the world: an object's annotated ones, a handle's from its label; those in reach."""
+"""An object's annotated grasps in the world, and which of them are in reach."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from manipose_mj.control.batch_ik import forward, seeds_for, solve
-from manipose_mj.control.belief import ObjectBelief, PartBelief
+from manipose_mj.control.belief import ObjectBelief
 from manipose_mj.mjcf.panda import MAX_OPENING
-from manipose_mj.poses import compose, rotation_about
 
 # How much further than the object the gripper is open on approach, in all [m].
 OPENING_MARGIN = 0.012
 MIN_CLEARANCE = 0.003  # between the open gripper and what it takes, in all [m]
-# Of the approach to a handle, about its long axis [rad], and along it [m].
-HANDLE_TILTS = (0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79)
-HANDLE_SLIDES = (0.0, 0.025, -0.025)
 # Smallest singular value of the Jacobian (m and rad alike) from which straight motions still go.
 MIN_DEXTERITY = 0.06
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -49,22 +45,6 @@ def object_grasps(thing: ObjectBelief) -> Grasps:
     own = thing.pose @ thing.grasps.poses[narrow]
     both = np.stack([own, own @ _HALF_TURN], axis=1).reshape(-1, 4, 4)
     return Grasps(both, np.repeat(thing.grasps.widths[narrow], 2))
-
-
-def handle_grasps(part: PartBelief) -> Grasps:
-    """Grasps around the bar of a handle: the hand comes along -Y of its label, tilted about X."""
-    handle = part.handle_pose
-    width = float(min(part.handle.extents[1:]))
-    poses = []
-    for tilt in HANDLE_TILTS:
-        for slide in HANDLE_SLIDES:
-            for sign in (1.0, -1.0):
-                turn = rotation_about(np.array([1.0, 0.0, 0.0]), tilt)
-                approach = turn @ np.array([0.0, -1.0, 0.0])
-                x = np.array([sign, 0.0, 0.0])
-                rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
-                poses.append(handle @ compose(rotation, np.array([slide, 0.0, 0.0])))
-    return Grasps(np.stack(poses), np.full(len(poses), width))
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,12 @@ from manipose_mj.poses import (
 
 # Heights from which an object is lowered to its place, best first [m].
 _DESCENTS = (0.10, 0.06, 0.03)
+# The same under a roof; and how far from all else it is carried there [m].
+LOW_LIFTS = (0.03, 0.018, 0.010)
+_INSIDE = 0.003
+# How far something is pulled from under a roof [m], if its approach was level enough [sine].
+_PULLS = (0.16, 0.09)
+_SIDEWAYS = 0.8
 # How far to back off after letting go, best first [m]; the last must do.
 RETREATS = (0.12, 0.18, 0.09, 0.06)
 HANDLE_RETREATS = (0.10, 0.07, 0.045)
@@ -132,6 +138,23 @@ class MotionPlanner:
                         return targets
         return None
 
+    def carrying_path(
+        self, start: Float[np.ndarray, "7"], goal: Float[np.ndarray, "7"], carried: Carried
+    ) -> Float[np.ndarray, "t 7"] | None:
+        """As `free_path`; from under a roof, where there is little room, at first back as the hand came."""
+        free = self.free_path(start, goal, carried=carried)
+        if free is not None:
+            return free
+        for distance in _PULLS:
+            back = self.backed_off(start, distance)
+            pull = self.line(start, back, clearance=CONTACT, carried=carried)
+            if pull is None:
+                continue
+            free = self.free_path(pull[-1], goal, carried=carried)
+            if free is not None:
+                return np.concatenate([pull, free])
+        return None
+
     def line(
         self,
         joints: Float[np.ndarray, "7"],
@@ -141,10 +164,11 @@ class MotionPlanner:
         target: Bool[np.ndarray, "ngeom"] | None = None,
         carried: Carried | None = None,
         touched: frozenset[str] = frozenset(),
+        off_support: bool = True,
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets along a straight line of the TCP to `goal`; None if it is not free.
 
-        What is carried may touch its support at the beginning only.
+        What is carried may touch its support at the beginning only, if the line leads `off_support`.
         """
         start = self.tcp_pose(joints)
         self._arm.follow(self.scene)
@@ -161,7 +185,7 @@ class MotionPlanner:
         lifted = replace(clearance, carried=max(clearance.carried, ROUNDED.carried))
         for q in [*targets[_CHECK_EVERY::_CHECK_EVERY], targets[-1]]:
             gone = float(np.linalg.norm(self.tcp_pose(q)[:3, 3] - start[:3, 3]))
-            allowed = lifted if gone > _SUPPORT_DISTANCE else clearance
+            allowed = lifted if off_support and gone > _SUPPORT_DISTANCE else clearance
             if self.collides(q, clearance=allowed, target=target, carried=carried):
                 return None
         return targets
@@ -173,6 +197,7 @@ class MotionPlanner:
         symmetry: SymmetryGroup,
         carried: Carried,
         near: Float[np.ndarray, "7"],
+        way_out: Float[np.ndarray, "3"] | None = None,
     ) -> Place | None:
         """A way to lower what is held to one of `label_poses`, nearest to the configuration `near`.
 
@@ -182,18 +207,24 @@ class MotionPlanner:
           symmetry: Turns that change nothing.
           carried: What is held, for collision checks.
           near: Preferred configuration there [rad].
+          way_out: Where the place has a roof: the way it is reached by, outwards [m].
         """
         tcp_poses = equivalent_poses(label_poses, symmetry) @ invert(pose_tcp)
         extra = np.broadcast_to(near, (len(tcp_poses), 7))
         reach = reachable(tcp_poses, near, extra_seeds=extra)
         order = np.argsort(np.abs(reach.joints - near).sum(axis=1), kind="stable")
         for k in order[:_MAX_PLACES]:
-            place = self._lowered(reach.joints[k], carried)
+            place = self._lowered(reach.joints[k], carried, way_out)
             if place is not None:
                 return place
         return None
 
-    def _lowered(self, joints: Float[np.ndarray, "7"], carried: Carried) -> Place | None:
+    def _lowered(
+        self,
+        joints: Float[np.ndarray, "7"],
+        carried: Carried,
+        way_out: Float[np.ndarray, "3"] | None,
+    ) -> Place | None:
         if self.collides(joints, clearance=CONTACT, carried=carried):
             return None
         # What is let go stays behind: only the arm has to get away.
@@ -203,15 +234,52 @@ class MotionPlanner:
             scene.first_collision(joints)  # puts what is carried in its place
             if self.line(joints, back, clearance=let_go, target=carried.geoms) is None:
                 return None
-        for height in _DESCENTS:
-            above = self.tcp_pose(joints)
-            above[2, 3] += height
-            ascent = self.line(joints, above, clearance=CONTACT, carried=carried)
-            if ascent is not None and not self.collides(
-                ascent[-1], clearance=TRANSIT, carried=carried
-            ):
+        for ascent in self.ascents(joints, carried, way_out):
+            if not self.collides(ascent[-1], clearance=TRANSIT, carried=carried):
                 return Place(ascent[-1], np.concatenate([ascent[::-1], joints[None]]))
         return None
+
+    def ascents(
+        self,
+        joints: Float[np.ndarray, "7"],
+        carried: Carried,
+        way_out: Float[np.ndarray, "3"] | None = None,
+    ) -> Iterator[Float[np.ndarray, "t 7"]]:
+        """Ways to lift what is held off its support, the best first; backwards they set it down.
+
+        Straight up; or, under a roof, up a little and back as the hand came, or along `way_out` [m].
+        """
+        if way_out is not None:
+            ways = [(height, way_out) for height in LOW_LIFTS]
+        else:
+            back = -self.tcp_pose(joints)[:3, 2]
+            ways = [(height, None) for height in _DESCENTS]
+            if back[2] < _SIDEWAYS:
+                ways += [(LOW_LIFTS[1], distance * back) for distance in _PULLS]
+        for height, way in ways:
+            ascent = self.lifted(joints, height, carried, way)
+            if ascent is not None:
+                yield ascent
+
+    def lifted(
+        self,
+        joints: Float[np.ndarray, "7"],
+        height: float,
+        carried: Carried,
+        way_out: Float[np.ndarray, "3"] | None = None,
+    ) -> Float[np.ndarray, "t 7"] | None:
+        """Joint targets that lift what is held off its support [m], and on along `way_out` [m]."""
+        above = self.tcp_pose(joints)
+        above[2, 3] += height
+        ascent = self.line(joints, above, clearance=CONTACT, carried=carried)
+        if ascent is None or way_out is None:
+            return ascent
+        above[:3, 3] += way_out
+        clearance = replace(CONTACT, carried=_INSIDE)
+        exit_ = self.line(
+            ascent[-1], above, clearance=clearance, carried=carried, off_support=False
+        )
+        return None if exit_ is None else np.concatenate([ascent, exit_])
 
     @contextmanager
     def part_at(self, part: PartBelief, opening: float) -> Iterator[None]:

@@ -51,6 +51,7 @@ class OracleSenses:
             grasps=entity.asset.grasps or none,
             body=body,
             geoms=subtree_geoms(self._scene.model, body),
+            rests=entity.asset.stable_poses,
         )
 
     def _parts(

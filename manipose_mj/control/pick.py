@@ -9,19 +9,19 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
+from manipose_mj.control.cavity_mouth import way_out
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import (
     Grasps,
     Reach,
-    handle_grasps,
     object_grasps,
     reachable,
 )
 from manipose_mj.control.motion_planner import (
-    HANDLE_RETREATS,
     MotionPlanner,
     equivalent_poses,
 )
+from manipose_mj.control.part_pick import grip_handle
 from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
 from manipose_mj.poses import invert, rotation_angle
 
@@ -32,6 +32,8 @@ _LEVER = 0.08
 _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
+# What can be lifted so far has room around it: a path is taken for granted before it is needed [m].
+_ROOMY = 0.05
 # The approach may brush nothing, but the open fingers pass the object closely.
 _APPROACH = replace(CONTACT, arm=0.002, target=0.0)
 
@@ -88,6 +90,7 @@ def pick_object(
             "plan", f"all {len(reach.index)} reachable grasps of {thing.name} collide"
         )
     approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
+    way = way_out(belief, destinations[0][:3, 3]) if destinations else None
     tries = 0
     for index, joints, goal in _with_destination(planner, grasps, free, thing, destinations):
         if index not in approaches:
@@ -98,7 +101,11 @@ def pick_object(
         if approach is None:
             continue
         tries += 1
-        if destinations and not _can_set_down(planner, grasps, index, thing, destinations, goal):
+        lift = _lift(planner, belief, grasps, index, thing, joints)
+        if destinations and (
+            lift is None
+            or not _can_carry(planner, grasps, index, thing, lift, destinations, goal, way)
+        ):
             continue
         planner.scene.set_opening(float(grasps.openings[index]))
         free_path = planner.free_path(belief.joints, approach[0])
@@ -116,45 +123,13 @@ def pick_object(
 def pick_part(
     planner: MotionPlanner, belief: Belief, part: PartBelief, opening: float | None
 ) -> PartPick:
-    """The first grasp of the handle that can be approached and can move the part to `opening`.
+    """A grip of the handle that can be approached and moves the part towards `opening`; None: anywhere.
 
     Raises:
       StageFailure: There is none.
     """
-    grasps = handle_grasps(part)
-    reach = reachable(grasps.tcp_poses, belief.joints)
-    free = _free_of_collision(planner, grasps, reach, part.geoms)
-    touched = frozenset({planner.body_name(part.body)})
-    for index, joints in zip(free.index, free.joints, strict=True):
-        planner.scene.set_opening(float(grasps.openings[index]))
-        if opening is not None and not _can_move_part(planner, part, joints, opening):
-            continue
-        approach = _approach(planner, grasps, index, joints, part.geoms, touched)
-        if approach is None:
-            continue
-        free_path = planner.free_path(belief.joints, approach[0])
-        if free_path is not None:
-            width, opening = float(grasps.widths[index]), float(grasps.openings[index])
-            return PartPick(free_path, approach, width, opening, joints)
-    raise StageFailure(
-        "plan",
-        f"no grasp of {part.name}'s handle works: {len(grasps)} tried, {len(reach.index)} in reach, "
-        f"{len(free.index)} free of collision",
-    )
-
-
-def _can_move_part(
-    planner: MotionPlanner, part: PartBelief, joints: Float[np.ndarray, "7"], opening: float
-) -> bool:
-    """Whether the arm can carry the handle all the way and get off it there."""
-    path = planner.part_path(joints, part, opening)
-    if path is None:
-        return False
-    with planner.part_at(part, opening):
-        back = planner.backed_off(path[-1], HANDLE_RETREATS[-1])
-        touched = frozenset({planner.body_name(part.body)})
-        line = planner.line(path[-1], back, clearance=_APPROACH, target=part.geoms, touched=touched)
-    return line is not None
+    grip = grip_handle(planner, belief, part, opening)
+    return PartPick(grip.free_path, grip.approach, grip.width, grip.opening, grip.approach[-1])
 
 
 def _free_of_collision(
@@ -222,19 +197,42 @@ def _promise(
     return 1 + tcp_goals[:, 2, 2] + turn / np.pi
 
 
-def _can_set_down(
+def _lift(
+    planner: MotionPlanner,
+    belief: Belief,
+    grasps: Grasps,
+    index: int,
+    thing: ObjectBelief,
+    joints: Float[np.ndarray, "7"],
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets that take the object off its support."""
+    carried = _carried(planner, grasps, index, thing)
+    planner.scene.set_opening(float(grasps.widths[index]))
+    way = way_out(belief, thing.label_pose[:3, 3])
+    return next(planner.ascents(joints, carried, way), None)
+
+
+def _can_carry(
     planner: MotionPlanner,
     grasps: Grasps,
     index: int,
     thing: ObjectBelief,
+    lift: Float[np.ndarray, "t 7"],
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     goal: Float[np.ndarray, "7"],
+    way: Float[np.ndarray, "3"] | None,
 ) -> bool:
+    """Whether the lifted object can be set down; where it cannot be lifted far, also on which path."""
     carried = _carried(planner, grasps, index, thing)
     planner.scene.set_opening(float(grasps.widths[index]))
     pose_tcp = invert(grasps.tcp_poses[index]) @ thing.label_pose
-    place = planner.place(pose_tcp, destinations, thing.label.symmetry, carried, goal)
-    return place is not None
+    place = planner.place(pose_tcp, destinations, thing.label.symmetry, carried, goal, way)
+    if place is None:
+        return False
+    risen = planner.tcp_pose(lift[-1])[2, 3] - planner.tcp_pose(lift[0])[2, 3]
+    if risen > _ROOMY:
+        return True
+    return planner.carrying_path(lift[-1], place.above, carried) is not None
 
 
 def _carried(planner: MotionPlanner, grasps: Grasps, index: int, thing: ObjectBelief) -> Carried:

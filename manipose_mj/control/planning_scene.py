@@ -28,11 +28,14 @@ class Clearance:
       arm: Between the robot and everything it may not touch.
       target: Between the gripper and the thing it is about to take or has just let go.
       carried: Between what is carried and everything but the gripper.
+      nudges: Whether the gripper and what it carries may push loose things aside, as far as the
+        scene allows.
     """
 
     arm: float
     target: float
     carried: float
+    nudges: bool = False
 
 
 # Paths through free space; the same once their corners are rounded; the same where the ends leave
@@ -40,7 +43,7 @@ class Clearance:
 TRANSIT = Clearance(arm=0.008, target=0.0, carried=0.012)
 ROUNDED = Clearance(arm=0.003, target=0.0, carried=0.006)
 GRAZING = Clearance(arm=0.001, target=0.0, carried=0.0)
-CONTACT = Clearance(arm=0.003, target=-0.003, carried=-0.003)
+CONTACT = Clearance(arm=0.003, target=-0.003, carried=-0.003, nudges=True)
 
 
 @dataclass(frozen=True)
@@ -77,8 +80,17 @@ def subtree_geoms(model: mujoco.MjModel, body: int) -> Bool[np.ndarray, "ngeom"]
     return inside[model.geom_bodyid]
 
 
+def forbid_sleep(model: mujoco.MjModel) -> None:
+    """Have all bodies computed: furniture that a task moves counts as asleep otherwise and stays."""
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+
+
 class PlanningScene:
-    """Answers whether a configuration of the arm, with what it carries, is free of collision."""
+    """Answers whether a configuration of the arm, with what it carries, is free of collision.
+
+    Attributes:
+      nudge: How far loose things may be pushed aside where a motion ends in contact [m].
+    """
 
     def __init__(self, model: mujoco.MjModel, robot_body: int, gripper_body: int) -> None:
         """Copies the model.
@@ -92,7 +104,14 @@ class PlanningScene:
         self.model.geom_margin[:] = DETECTION_DISTANCE
         # The broad phase drops pairs of bodies by margins of its own.
         self.model.body_margin[:] = DETECTION_DISTANCE
+        forbid_sleep(self.model)
         self.data = mujoco.MjData(self.model)
+        self._contype = model.geom_contype.copy()
+        roots = model.body_rootid[model.geom_bodyid]
+        free = int(mujoco.mjtJoint.mjJNT_FREE)
+        jointed = model.body_jntnum[roots] == 1
+        self._loose = jointed & (model.jnt_type[model.body_jntadr[roots]] == free)
+        self.nudge = 0.0
         self.robot = subtree_geoms(model, robot_body)
         self.gripper = subtree_geoms(model, gripper_body)
         prefix = model.body(robot_body).name.rstrip("/")
@@ -101,6 +120,7 @@ class PlanningScene:
             [model.joint(f"{prefix}/finger_joint{i}").qposadr[0] for i in (1, 2)]
         )
         self._tcp = model.site(f"{prefix}/tcp").id
+        self._only_moving(self.robot)
         self._target = np.zeros(model.ngeom, bool)
         self._carried: Carried | None = None
         self._clearance = TRANSIT
@@ -129,11 +149,43 @@ class PlanningScene:
         none = np.zeros(self.model.ngeom, bool)
         self._clearance, self._carried = clearance, carried
         self._target = none if target is None else target
+        self._only_moving(self.robot if carried is None else self.robot | carried.geoms)
         try:
             yield self
         finally:
             self._clearance, self._target, self._carried = saved
+            before = self._carried
+            self._only_moving(self.robot if before is None else self.robot | before.geoms)
             self.data.qpos[:] = positions
+
+    def _only_moving(self, moving: Bool[np.ndarray, "ngeom"]) -> None:
+        """Look for contacts of these with anything: those of the rest do not matter, in a pile of
+        things they are most of the work."""
+        model = self.model
+        model.geom_contype[:] = np.where(moving, self._contype, 0)
+        bodies = np.zeros(model.nbody, model.body_contype.dtype)
+        np.bitwise_or.at(bodies, model.geom_bodyid, model.geom_contype)
+        model.body_contype[:] = bodies
+
+    def touching(
+        self, geoms: Bool[np.ndarray, "ngeom"], distance: float
+    ) -> list[tuple[int, float]]:
+        """What is nearer to these geoms than `distance` [m], where everything is now.
+
+        Returns:
+          The other geom, and the vertical part of the direction towards it, of each contact.
+        """
+        self._only_moving(geoms)
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_collision(self.model, self.data)
+        self._only_moving(self.robot)
+        found = []
+        for contact in self.data.contact:
+            first, second = int(contact.geom1), int(contact.geom2)
+            if contact.dist < distance and geoms[first] != geoms[second]:
+                upwards = float(contact.frame[2])
+                found.append((second, upwards) if geoms[first] else (first, -upwards))
+        return found
 
     def tcp_pose(self, joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
         """`T_world_tcp` in this configuration."""
@@ -177,6 +229,11 @@ class PlanningScene:
         allowed[robot_1 & robot_2] = 0.0
         gripper = self.gripper[first] | self.gripper[second]
         target = self._target[first] | self._target[second]
+        if clearance.nudges and self.nudge > 0:
+            pushed = (load | one_robot & gripper) & (self._loose[first] | self._loose[second])
+            # What is carried is loose too, but not what it lies on.
+            pushed &= ~(load & (self._loose[first] ^ self._loose[second]))
+            allowed[pushed] = np.minimum(allowed[pushed], -self.nudge)
         allowed[one_robot & gripper & target] = clearance.target
         allowed[one_robot & gripper & (carried_1 | carried_2)] = -np.inf
         return allowed

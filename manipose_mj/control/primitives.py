@@ -8,10 +8,25 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.belief import Belief, PartBelief
+from manipose_mj.control.cavity_mouth import way_out
 from manipose_mj.control.executor import Actions, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import OPENING_MARGIN
-from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner, Place
+from manipose_mj.control.motion_planner import (
+    HANDLE_RETREATS,
+    RETREATS,
+    MotionPlanner,
+    Place,
+)
+from manipose_mj.control.part_holds import grip_now
+from manipose_mj.control.part_motion import find_way
+from manipose_mj.control.part_pick import (
+    MIN_SHARE,
+    ending_free,
+    off_surface,
+    push_part,
+    share_of,
+)
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
 from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, carried_free_body
@@ -26,14 +41,15 @@ _SLIP = (0.002, 0.02)
 _BIG_SLIP = (0.01, 0.08)
 # Of a part's joint from where it should have gone, as a share of its range.
 _OPENING_TOLERANCE = 0.12
-_LIFTS = (0.10, 0.06, 0.03)
+_PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _SETTLE = 0.25  # after letting go [s]
 
 
 @dataclass(frozen=True)
 class _Held:
-    """Attributes: pick: how it was taken; pose_tcp: `T_tcp_label` then (of a handle, for a part)."""
+    """Attributes: name; pick: how it was taken; pose_tcp: `T_tcp_label` then (of a handle, for a part)."""
 
+    name: str
     pick: ObjectPick | PartPick
     pose_tcp: Float[np.ndarray, "4 4"]
 
@@ -48,6 +64,11 @@ class Primitives:
         self._executor = executor
         self._planner = planner
         self._held: _Held | None = None
+
+    @property
+    def held(self) -> str | None:
+        """What is held."""
+        return None if self._held is None else self._held.name
 
     def grasp_at(self, name: str, destination: Step | None) -> Actions:
         """Take hold of an object, or of a part's handle, in a way that allows the next `move_to`."""
@@ -64,24 +85,30 @@ class Primitives:
         yield from self._executor.close()
         belief = self._executor.perceive()
         if belief.opening < min(0.5 * pick.width, pick.width - 0.004):
+            yield from self._let_go(name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
-        self._held = _Held(pick, self._pose_in_hand(belief, name))
+        self._held = _Held(name, pick, self._pose_in_hand(belief, name))
 
     def move_to(self, step: Step) -> Actions:
         """Bring what is held to its destination."""
-        if self._held is None:
+        if self._held is None and step.opening is not None:
+            yield from self._push_part(step.subject, step.opening)
+        elif self._held is None:
             raise StageFailure("plan", f"move_to {step.subject} while nothing is held")
-        if isinstance(self._held.pick, PartPick):
+        elif isinstance(self._held.pick, PartPick):
             yield from self._move_part(step, self._held.pick)
         else:
             yield from self._move_object(step, self._held.pick)
 
     def release(self, name: str) -> Actions:
         """Let go and back off along the approach."""
-        belief = self._executor.perceive()
         held, self._held = self._held, None
         if held is None:
             raise StageFailure("plan", f"release {name} while nothing is held")
+        yield from self._let_go(name)
+
+    def _let_go(self, name: str) -> Actions:
+        belief = self._executor.perceive()
         opening = min(belief.opening + OPENING_MARGIN, MAX_OPENING)
         yield from self._executor.open_to(opening)
         yield from self._executor.wait(_SETTLE)
@@ -115,10 +142,13 @@ class Primitives:
         belief = self._executor.perceive()
         pose_tcp = self._check_held(belief, name)
         thing, carried = belief.objects[name], self._carried(belief, name)
-        place = self._planner.place(pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal)
+        way = way_out(belief, step.poses[0][:3, 3])
+        place = self._planner.place(
+            pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal, way
+        )
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
-        free = self._planner.free_path(belief.joints, place.above, carried=carried)
+        free = self._planner.carrying_path(belief.joints, place.above, carried)
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
         yield from self._executor.follow(free)
@@ -139,7 +169,8 @@ class Primitives:
         """A short path and a descent for the thing as it lies in the hand now."""
         carried = self._carried(belief, name)
         symmetry = belief.objects[name].label.symmetry
-        place = self._planner.place(pose_tcp, step.poses, symmetry, carried, belief.joints)
+        way = way_out(belief, step.poses[0][:3, 3])
+        place = self._planner.place(pose_tcp, step.poses, symmetry, carried, belief.joints, way)
         if place is None:
             return None
         free = self._planner.free_path(belief.joints, place.above, carried=carried)
@@ -148,13 +179,9 @@ class Primitives:
     def _lift(self, name: str) -> Float[np.ndarray, "t 7"]:
         belief = self._executor.perceive()
         carried = self._carried(belief, name)
-        tcp = self._planner.tcp_pose(belief.joints)
-        for height in _LIFTS:
-            lift = self._planner.line(
-                belief.joints, _raised(tcp, height), clearance=CONTACT, carried=carried
-            )
-            if lift is not None:
-                return lift
+        way = way_out(belief, belief.objects[name].label_pose[:3, 3])
+        for lift in self._planner.ascents(belief.joints, carried, way):
+            return lift
         raise StageFailure("plan", f"no way to lift {name}")
 
     def _carried(self, belief: Belief, name: str) -> Carried:
@@ -172,17 +199,52 @@ class Primitives:
         belief = self._executor.perceive()
         part = belief.parts[step.subject]
         self._check_held(belief, step.subject)
-        path = self._planner.part_path(belief.joints, part, step.opening)
-        if path is None:
-            raise StageFailure("plan", f"the arm cannot carry {step.subject} all the way")
-        yield from self._executor.follow(path)
-        moved = self._executor.perceive().parts[step.subject]
-        low, high = moved.joint.range
-        if abs(moved.opening - step.opening) > _OPENING_TOLERANCE * (high - low):
+        yield from self._lead_part(belief, part, step.opening)
+
+    def _lead_part(self, belief: Belief, part: PartBelief, opening: float) -> Actions:
+        """As far as the hand on the handle can lead it: a push may do the rest."""
+        tcp = self._planner.tcp_pose(belief.joints)
+        hold, tilt = grip_now(part, tcp, belief.opening)
+        way = find_way(
+            self._planner,
+            part,
+            hold,
+            opening,
+            near=belief.joints,
+            start=belief.joints,
+            start_tilt=tilt,
+        )
+        way = None if way is None else ending_free(self._planner, part, way)
+        if way is None or share_of(way, part, opening) < MIN_SHARE[part.joint.kind]:
+            raise StageFailure("plan", f"the arm cannot carry {part.name} far by its handle")
+        yield from self._executor.follow(way.targets(self._executor.timestep))
+        moved = self._executor.perceive().parts[part.name].opening
+        low, high = part.joint.range
+        if abs(moved - way.openings[-1]) > _OPENING_TOLERANCE * (high - low):
             raise StageFailure(
                 "motion",
-                f"{step.subject} is at {moved.opening:.3f}, should be at {step.opening:.3f}",
+                f"{part.name} is at {moved:.3f}, the hand should have it at {way.openings[-1]:.3f}",
             )
+
+    def _push_part(self, name: str, opening: float) -> Actions:
+        """With closed fingers; nothing to do where the part is there already."""
+        part = self._executor.perceive().parts[name]
+        low, high = part.joint.range
+        if abs(part.opening - opening) < _PUSH_TOLERANCE * (high - low):
+            return
+        yield from self._executor.close()
+        belief = self._executor.perceive()
+        push = push_part(self._planner, belief, belief.parts[name], opening)
+        yield from self._executor.follow(push.free_path)
+        yield from self._executor.follow(push.approach)
+        yield from self._executor.follow(push.way.targets(self._executor.timestep))
+        belief = self._executor.perceive()
+        back = off_surface(self._planner, belief.parts[name], push.way, belief.joints)
+        if back is not None:
+            yield from self._executor.follow(back)
+        moved = belief.parts[name].opening
+        if abs(moved - opening) > _OPENING_TOLERANCE * (high - low):
+            raise StageFailure("motion", f"{name} is at {moved:.3f}, should be at {opening:.3f}")
 
     def _pose_in_hand(self, belief: Belief, name: str) -> Float[np.ndarray, "4 4"]:
         part: PartBelief | None = belief.parts.get(name)
@@ -214,9 +276,3 @@ def _moved(
     """Whether a thing has slipped in the hand by more than a distance [m] or an angle [rad]."""
     shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
     return shift > limit[0] or float(rotation_angle(a[:3, :3], b[:3, :3])) > limit[1]
-
-
-def _raised(pose: Float[np.ndarray, "4 4"], height: float) -> Float[np.ndarray, "4 4"]:
-    raised = pose.copy()
-    raised[2, 3] += height
-    return raised

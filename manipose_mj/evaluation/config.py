@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from manipose_mj import protocol
 from manipose_mj.errors import InputError
 
 
@@ -26,6 +27,8 @@ class EvaluationConfig:
       jobs: Episodes that run at the same time, each on one core. Results do not depend on it.
       assets: Folder of built assets; None takes the built-in objects.
       object_name: The one object to manipulate; None lets the task choose.
+      protocol: Version of the protocol whose seeds and test objects to take instead of `seed` and the
+        training objects.
     """
 
     tasks: tuple[str, ...]
@@ -36,6 +39,7 @@ class EvaluationConfig:
     jobs: int = 1
     assets: Path | None = None
     object_name: str | None = None
+    protocol: str | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -45,6 +49,27 @@ class EvaluationConfig:
         for name, least in (("episodes", 1), ("seed", 0), ("jobs", 1)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; expected at least {least}")
+        if self.protocol is not None:
+            self._check_protocol(protocol.load(self.protocol))
+
+    def _check_protocol(self, frozen: protocol.Protocol) -> None:
+        if self.seed or self.assets is not None or self.object_name is not None:
+            raise InputError(
+                f"protocol {self.protocol} fixes seeds and objects; leave out seed, assets and object"
+            )
+        for task in self.tasks:
+            frozen.seed(task, self.episodes - 1)
+
+    @property
+    def split(self) -> str:
+        """Which built-in objects the episodes use."""
+        return "train" if self.protocol is None else "test"
+
+    def episode_seed(self, task: str, episode: int) -> int:
+        """The seed of one episode."""
+        if self.protocol is not None:
+            return protocol.load(self.protocol).seed(task, episode)
+        return episode_seed(self.seed, task, episode)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -56,13 +81,16 @@ class EvaluationConfig:
             "pose": self.pose,
             "assets": None if self.assets is None else str(self.assets.resolve()),
             "object": self.object_name,
+            "protocol": self.protocol,
+            "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,
         }
 
     @property
     def command(self) -> str:
         """The command line that repeats this evaluation."""
         words = ["manipose", "evaluate", *self.tasks]
-        words += ["--episodes", str(self.episodes), "--seed", str(self.seed), "--pose", self.pose]
+        chosen = ["--protocol", self.protocol] if self.protocol else ["--seed", str(self.seed)]
+        words += ["--episodes", str(self.episodes), *chosen, "--pose", self.pose]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.assets is not None:
             words += ["--assets", str(self.assets)]

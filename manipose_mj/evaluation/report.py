@@ -36,7 +36,7 @@ REPORT_FILE = "report.html"
 
 logger = logging.getLogger(__name__)
 
-# `scene(task, seed=, assets=, object_name=)` is the model in which an episode took place.
+# `scene(task, seed=, assets=, object_name=, split=)` is the model in which an episode took place.
 Scene = Callable[..., mujoco.MjModel]
 
 
@@ -127,6 +127,7 @@ def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film
             seed=result.seed,
             assets=None if summary["assets"] is None else Path(summary["assets"]),
             object_name=summary["object"],
+            split=summary["split"],
         )
         return shoot(film, model, trajectory, playback)
     except Exception as error:  # the numbers must not be lost for a picture

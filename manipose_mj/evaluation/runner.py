@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from manipose_mj.errors import InputError, WorkerDiedError
-from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
+from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     Trajectory,
@@ -45,6 +45,7 @@ class Runner(Protocol):
         pose: str,
         assets: Path | None,
         object_name: str | None,
+        split: str,
     ) -> tuple[EpisodeResult, Trajectory]: ...
 
 
@@ -219,7 +220,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     Raises:
       InputError: The episode's input is wrong, or its trajectory cannot be written.
     """
-    seed = episode_seed(config.seed, task, episode)
+    seed = config.episode_seed(task, episode)
     path = trajectory_path(config.out, task, episode)
     start = time.perf_counter()
     try:
@@ -230,6 +231,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
             pose=config.pose,
             assets=config.assets,
             object_name=config.object_name,
+            split=config.split,
         )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
     except (InputError, OSError, MemoryError):
@@ -267,6 +269,7 @@ def _crashed(
 
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
+    settings["split"] = config.split
     return {
         "tasks": summarize(results),
         "versions": versions(),

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.ray_camera import Intrinsics
-from manipose_mj.poses import transform
+from manipose_mj.mjcf.ray_casting import rotated
 
 NO_INSTANCE = -1
 _STEEPEST = 4.0  # depth step between neighbours, in footprints, that ends a surface: 76 deg
@@ -26,11 +26,13 @@ class PointCloud:
       points_world: `(n, 3)` float32 [m].
       normals_world: `(n, 3)` float32, unit, towards the camera that saw the point; zero where
         unknown.
+      colours: `(n, 3)` uint8, red, green, blue as displays take them; black where unknown.
       instance: `(n,)` int32, which object the point is on; -1 marks padding.
     """
 
     points_world: Float[np.ndarray, "n 3"]
     normals_world: Float[np.ndarray, "n 3"]
+    colours: UInt8[np.ndarray, "n 3"]
     instance: Int[np.ndarray, "n"]
 
     def __len__(self) -> int:
@@ -43,33 +45,53 @@ class PointCloud:
 
     def of_instance(self, instance: int) -> PointCloud:
         """The points on one object."""
-        return self._rows(self.instance == instance)
+        return self._rows(np.flatnonzero(self.instance == instance))
 
     def resized(self, count: int) -> PointCloud:
         """Exactly `count` rows, for observations of one shape.
 
-        A larger cloud loses points drawn by a permutation that depends on its size alone, so equal
-        clouds give equal observations and no random state is touched; a smaller one is padded with
-        rows of zeros and instance -1. Order is kept; padding comes last.
+        A larger cloud loses points as `subset` says; a smaller one is padded with rows of zeros and
+        instance -1. Order is kept; padding comes last.
 
         Raises:
           InputError: `count` is not positive.
         """
         if count < 1:
             raise InputError(f"cloud size {count}: expected at least one point")
-        cloud = self._rows(self.valid)
+        cloud = self._points()
         if len(cloud) >= count:
-            chosen = np.random.default_rng(len(cloud)).permutation(len(cloud))[:count]
-            return cloud._rows(np.sort(chosen))
+            return cloud._rows(subset(len(cloud), count))
         padding = count - len(cloud)
         return PointCloud(
             np.pad(cloud.points_world, ((0, padding), (0, 0))),
             np.pad(cloud.normals_world, ((0, padding), (0, 0))),
+            np.pad(cloud.colours, ((0, padding), (0, 0))),
             np.pad(cloud.instance, (0, padding), constant_values=NO_INSTANCE),
         )
 
-    def _rows(self, rows: np.ndarray) -> PointCloud:
-        return PointCloud(self.points_world[rows], self.normals_world[rows], self.instance[rows])
+    def _points(self) -> PointCloud:
+        """Itself without padding."""
+        valid = self.valid
+        return self if valid.all() else self._rows(np.flatnonzero(valid))
+
+    def _rows(self, rows: Int[np.ndarray, "m"]) -> PointCloud:
+        return PointCloud(
+            self.points_world[rows],
+            self.normals_world[rows],
+            self.colours[rows],
+            self.instance[rows],
+        )
+
+
+def subset(size: int, count: int) -> Int[np.ndarray, "n"]:
+    """At most `count` of `size` rows, in their order.
+
+    They are drawn by a permutation that depends on the size alone, so equal clouds give equal
+    observations and no random state is touched.
+    """
+    if size <= count:
+        return np.arange(size)
+    return np.sort(np.random.default_rng(size).permutation(size)[:count])
 
 
 def cloud_from_depth(
@@ -79,6 +101,7 @@ def cloud_from_depth(
     T_world_camera: Float[np.ndarray, "4 4"],
     *,
     normal: Float[np.ndarray, "height width 3"] | None = None,
+    colour: UInt8[np.ndarray, "height width 3"] | None = None,
 ) -> PointCloud:
     """The points of the pixels that have a depth and an instance.
 
@@ -88,6 +111,7 @@ def cloud_from_depth(
       intrinsics: Of an image of this size.
       T_world_camera: Camera frame of OpenCV (x right, y down, z forward), as from `camera_pose`.
       normal: World normals; estimated from the depth's differences if not given.
+      colour: Of the pixels; black if not given.
 
     Raises:
       InputError: An image's shape is not that of the intrinsics.
@@ -96,28 +120,39 @@ def cloud_from_depth(
     for name, image in (("depth", depth), ("instance", instance)):
         if image.shape != shape:
             raise InputError(f"{name} image is {image.shape}; the intrinsics say {shape}")
-    keep = np.isfinite(depth) & (depth > 0) & (instance >= 0)
-    depth = np.where(keep, depth, 0.0)
-    slopes = intrinsics.slopes()
-    camera_points = np.concatenate([slopes, np.ones((*shape, 1))], axis=-1) * depth[..., None]
+    kept = np.isfinite(depth) & (depth > 0) & (instance >= 0)
+    keep = np.flatnonzero(kept.ravel())
     if normal is None:
-        normal = normals_from_points(camera_points) @ T_world_camera[:3, :3].T
+        rays = np.concatenate([intrinsics.slopes(), np.ones((*shape, 1))], axis=-1)
+        estimated = normals_from_points(rays * np.where(kept, depth, 0.0)[..., None])
+        normals = rotated(estimated.reshape(-1, 3)[keep], T_world_camera[:3, :3])
+    else:
+        normals = normal.reshape(-1, 3)[keep]
+    slopes = intrinsics.slopes().reshape(-1, 2)[keep]
+    rays = np.concatenate([slopes, np.ones((len(keep), 1))], axis=1)
+    rays *= depth.ravel()[keep, None]
+    points = rotated(rays, T_world_camera[:3, :3]) + T_world_camera[:3, 3]
+    colours = np.zeros((len(keep), 3), np.uint8)
+    if colour is not None:
+        colours = colour.reshape(-1, 3)[keep]
     return PointCloud(
-        transform(T_world_camera, camera_points[keep]).astype(np.float32),
-        normal[keep].astype(np.float32),
-        instance[keep].astype(np.int32),
+        points.astype(np.float32),
+        normals.astype(np.float32),
+        colours,
+        instance.ravel()[keep].astype(np.int32),
     )
 
 
 def fuse(clouds: Sequence[PointCloud]) -> PointCloud:
     """Several cameras' clouds as one, in the order given, padding left out."""
-    clouds = [c._rows(c.valid) for c in clouds]
+    clouds = [c._points() for c in clouds]
     if not clouds:
         empty = np.empty((0, 3), np.float32)
-        return PointCloud(empty, empty, np.empty(0, np.int32))
+        return PointCloud(empty, empty, empty.astype(np.uint8), np.empty(0, np.int32))
     return PointCloud(
         np.concatenate([c.points_world for c in clouds]),
         np.concatenate([c.normals_world for c in clouds]),
+        np.concatenate([c.colours for c in clouds]),
         np.concatenate([c.instance for c in clouds]),
     )
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from manipose_mj.mjcf.ray_camera import Intrinsics
 
@@ -111,14 +111,32 @@ def projector_shadow(
     return seen & (nearest < column - 0.5)
 
 
-def structured_light(
+@dataclass(frozen=True)
+class Measured:
+    """A depth image as a sensor reports it.
+
+    Attributes:
+      depth: [m]; 0 where it fails.
+      rows, columns: Of the pixel that each pixel shows: its own, or, beyond an edge, one nearby.
+    """
+
+    depth: Float[np.ndarray, "height width"]
+    rows: Int[np.ndarray, "height width"]
+    columns: Int[np.ndarray, "height width"]
+
+    def moved(self, image: np.ndarray) -> np.ndarray:
+        """Another image of the same view, its edges where this sensor sees them."""
+        return image[self.rows, self.columns]
+
+
+def measure(
     depth: Float[np.ndarray, "height width"],
     cosine: Float[np.ndarray, "height width"],
     intrinsics: Intrinsics,
     rng: np.random.Generator,
     sensor: StructuredLight = KINECT,
-) -> Float[np.ndarray, "height width"]:
-    """The depth image as the sensor reports it, 0 where it fails.
+) -> Measured:
+    """The depth image as the sensor reports it, and which pixels its edges show.
 
     Edges move by the lateral noise, depth by the axial noise and to the sensor's steps; pixels fail
     in the projector's shadow, at grazing incidence, out of range and, a few, anywhere.
@@ -132,9 +150,9 @@ def structured_light(
     """
     shadow = projector_shadow(depth, intrinsics.fx, sensor.baseline)
     incidence = np.arccos(np.clip(np.where(depth > 0, cosine, 1.0), 0.0, 1.0))
-    depth, incidence = _edges_moved(
-        np.where(shadow, 0.0, depth), incidence, intrinsics.fx, sensor.focal, rng
-    )
+    lit = np.where(shadow, 0.0, depth)
+    rows, columns = _edges_moved(lit, incidence, intrinsics.fx, sensor.focal, rng)
+    depth, incidence = lit[rows, columns], incidence[rows, columns]
     step = sensor.disparity_step * depth**2
     # What the sources measured includes the steps, whose variance is a twelfth of their square.
     variance = axial_deviation(depth, incidence) ** 2 - step**2 / 12
@@ -143,7 +161,19 @@ def structured_light(
     failing = np.clip((incidence - first) / (last - first), 0.0, 1.0) + sensor.speckle
     kept = (depth > 0) & (noisy > sensor.near) & (noisy < sensor.far)
     kept &= rng.random(depth.shape) >= failing
-    return quantised(np.where(kept, noisy, 0.0), sensor.disparity_step)
+    steps = quantised(np.where(kept, noisy, 0.0), sensor.disparity_step)
+    return Measured(steps, rows, columns)
+
+
+def structured_light(
+    depth: Float[np.ndarray, "height width"],
+    cosine: Float[np.ndarray, "height width"],
+    intrinsics: Intrinsics,
+    rng: np.random.Generator,
+    sensor: StructuredLight = KINECT,
+) -> Float[np.ndarray, "height width"]:
+    """The depth alone of `measure`."""
+    return measure(depth, cosine, intrinsics, rng, sensor).depth
 
 
 def _edges_moved(
@@ -152,16 +182,17 @@ def _edges_moved(
     focal: float,
     source_focal: float,
     rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Depth and incidence of a pixel nearby where that lies beyond an edge, else the pixel's own."""
+) -> tuple[Int[np.ndarray, "height width"], Int[np.ndarray, "height width"]]:
+    """Row and column of a pixel nearby where that lies beyond an edge, else of the pixel itself."""
     height, width = depth.shape
     deviation = lateral_deviation(incidence) * (focal / source_focal)
     shift = rng.standard_normal((2, height, width)) * deviation
-    rows = np.clip(np.rint(np.arange(height)[:, None] + shift[0]), 0, height - 1).astype(np.int64)
-    columns = np.clip(np.rint(np.arange(width) + shift[1]), 0, width - 1).astype(np.int64)
+    row, column = np.indices(depth.shape)
+    rows = np.clip(np.rint(row + shift[0]), 0, height - 1).astype(np.int64)
+    columns = np.clip(np.rint(column + shift[1]), 0, width - 1).astype(np.int64)
     there = depth[rows, columns]
     # On one surface depth changes by the way times the slope; more is an edge.
     way = np.hypot(*shift) * np.maximum(depth, there) / focal
     slope = np.tan(np.minimum(incidence, np.deg2rad(80.0)))
     edge = (depth == 0) | (there == 0) | (np.abs(there - depth) > _EDGE + 2 * way * slope)
-    return np.where(edge, there, depth), np.where(edge, incidence[rows, columns], incidence)
+    return np.where(edge, rows, row), np.where(edge, columns, column)

@@ -8,7 +8,14 @@ from jaxtyping import Float, Int
 
 from asset_pipeline.assets import Asset
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.arena import CONTACT_TIME
 from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
+
+
+def _stiffen(root: mjcf.RootElement) -> None:
+    for geom in root.find_all("geom"):
+        if geom.solref is not None:
+            geom.solref = [CONTACT_TIME, 1.0]
 
 
 class RigidObject(composer.Entity):
@@ -20,6 +27,7 @@ class RigidObject(composer.Entity):
         self.asset = asset
         self._mjcf_root = mjcf.from_path(str(asset.model_path))
         self._mjcf_root.model = name or asset.name
+        _stiffen(self._mjcf_root)
         # The arena's attachment frame carries the free joint instead of the stand-alone model's.
         for joint in self._mjcf_root.find_all("joint"):
             joint.remove()
@@ -64,6 +72,7 @@ class ArticulatedObject(composer.Entity):
         self.asset = asset
         self._mjcf_root = mjcf.from_path(str(asset.model_path))
         self._mjcf_root.model = name or asset.name
+        _stiffen(self._mjcf_root)
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+import mujoco
 import numpy as np
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
@@ -21,7 +22,6 @@ from manipose_mj.mjcf.panda_kinematics import (
 )
 from manipose_mj.mjcf.panda_menagerie import find_menagerie_panda, require_menagerie_panda
 from manipose_mj.mjcf.panda_model import build_panda
-from manipose_mj.poses import pose_to_vector
 
 __all__ = [
     "ACCELERATION_LIMITS",
@@ -35,6 +35,7 @@ __all__ = [
     "PandaObservables",
 ]
 
+_LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
 Visuals = Literal["auto", "primitive", "menagerie"]
 
 
@@ -68,6 +69,7 @@ class Panda(composer.Entity):
         self._finger_joints = [self._model.find("joint", f"finger_joint{i}") for i in (1, 2)]
         self._actuators = [self._model.find("actuator", f"actuator{i}") for i in range(1, 8)]
         self._gripper_actuator = self._model.find("actuator", "gripper")
+        self._controls: tuple[mujoco.MjModel, Int[np.ndarray, "7"], int] | None = None
 
     def _build_observables(self) -> PandaObservables:
         return PandaObservables(self)
@@ -160,8 +162,33 @@ class Panda(composer.Entity):
         self, physics: mjcf.Physics, joints: Float[np.ndarray, "7"], opening: float
     ) -> None:
         """Writes joint angles [rad] and the opening [m] as controls, clipped to their limits."""
-        physics.bind(self._actuators).ctrl = np.clip(joints, *POSITION_LIMITS.T)
-        physics.bind(self._gripper_actuator).ctrl = np.clip(opening, 0.0, MAX_OPENING)
+        arm, gripper = self._control_ids(physics)
+        control = physics.data.ptr.ctrl
+        control[arm] = np.clip(joints, POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1])
+        control[gripper] = min(max(opening, 0.0), MAX_OPENING)
+
+    def follow_targets(self, physics: mjcf.Physics, target: Float[np.ndarray, "8"]) -> None:
+        """Applies joint angles [rad] and an opening [m], but no faster than the joints' velocity limits.
+
+        To be called before every physics step. The servos of a real Panda refuse set-points that jump; here
+        they follow, as fast as is allowed.
+        """
+        arm, gripper = self._control_ids(physics)
+        control = physics.data.ptr.ctrl
+        most = VELOCITY_LIMITS * physics.model.ptr.opt.timestep
+        now = control[arm]
+        # Within a step's way of where it is, then within the limits; without np.clip's overhead.
+        joints = np.minimum(np.maximum(target[:7], now - most), now + most)
+        control[arm] = np.minimum(np.maximum(joints, _LOWEST), _HIGHEST)
+        control[gripper] = min(max(target[7], 0.0), MAX_OPENING)
+
+    def _control_ids(self, physics: mjcf.Physics) -> tuple[Int[np.ndarray, "7"], int]:
+        """Where the controls of the arm and the gripper are, looked up once per compiled model."""
+        if self._controls is None or self._controls[0] is not physics.model.ptr:
+            arm = np.array(physics.bind(self._actuators).element_id)
+            gripper = int(physics.bind(self._gripper_actuator).element_id)
+            self._controls = (physics.model.ptr, arm, gripper)
+        return self._controls[1:]
 
     def configuration(self, physics: mjcf.Physics) -> tuple[Float[np.ndarray, "7"], float]:
         """The joint angles [rad] and the opening [m] now."""
@@ -205,4 +232,14 @@ class PandaObservables(composer.Observables):
     @composer.observable
     def tcp_pose(self) -> observable.Observable:
         """The TCP in the world frame: position [m], then quaternion wxyz."""
-        return observable.Generic(lambda physics: pose_to_vector(self._entity.tcp_pose(physics)))
+        return observable.Generic(self._tcp_vector)
+
+    def _tcp_vector(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
+        site = physics.bind(self._entity.tcp_site)
+        vector = np.empty(7)
+        vector[:3] = site.xpos
+        mujoco.mju_mat2Quat(vector[3:], np.array(site.xmat))
+        # The sign of `rotation_to_quaternion`, which takes ten times as long.
+        first = vector[3:][np.abs(vector[3:]) > 1e-12][0]
+        vector[3:] *= np.sign(first)
+        return vector

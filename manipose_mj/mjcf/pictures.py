@@ -15,7 +15,7 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf import gl
 from manipose_mj.mjcf.ray_camera import camera_id
 from manipose_mj.mjcf.ray_casting import PICTURE_GROUPS
-from manipose_mj.mjcf.ray_picture import RayPainter
+from manipose_mj.mjcf.ray_picture import RayLook, RayPainter
 
 _log = logging.getLogger(__name__)
 
@@ -28,6 +28,10 @@ class Painter(Protocol):
 
     def paint(self, data: mujoco.MjData, camera: int | str) -> UInt8[np.ndarray, "height width 3"]:
         """What the camera sees."""
+        ...
+
+    def close(self) -> None:
+        """Free what GL holds."""
         ...
 
 
@@ -62,21 +66,47 @@ def painter(
     model: mujoco.MjModel, height: int, width: int, *, engine: Engine = "auto"
 ) -> Iterator[Painter]:
     """A painter for many pictures of a model; arguments and errors as for `render`."""
+    drawing = make_painter(model, height, width, engine=engine)
+    try:
+        yield drawing
+    finally:
+        drawing.close()
+
+
+def make_painter(
+    model: mujoco.MjModel,
+    height: int,
+    width: int,
+    *,
+    engine: Engine = "auto",
+    groups: tuple[int, ...] = PICTURE_GROUPS,
+    look: RayLook | None = None,
+) -> Painter:
+    """A painter that the caller closes; arguments and errors as for `render`.
+
+    Args:
+      model: The compiled model.
+      height: In pixels.
+      width: In pixels.
+      engine: Which renderer.
+      groups: Of the geoms that are shown.
+      look: Of pictures without GL.
+    """
     if engine not in ENGINES:
         raise unknown_name("engine", engine, ENGINES)
     if height < 1 or width < 1:
         raise InputError(f"picture size {height} x {width}: height and width must be positive")
-    if _binds_gl(engine):
-        drawing = _GLPainter(model, height, width)
-        try:
-            yield drawing
-        finally:
-            drawing.close()
-    else:
-        yield RayPainter(model, height, width)
+    if binds_gl(engine):
+        return _GLPainter(model, height, width, groups)
+    return RayPainter(model, height, width, look, groups=groups)
 
 
-def _binds_gl(engine: Engine) -> bool:
+def binds_gl(engine: Engine) -> bool:
+    """Whether this engine is GL here; binds this process to the platform that works.
+
+    Raises:
+      InputError: GL was asked for and does not work; says what to install.
+    """
     if engine == "ray":
         return False
     if engine == "gl":
@@ -95,7 +125,9 @@ def _binds_gl(engine: Engine) -> bool:
 class _GLPainter:
     """`mujoco.Renderer` at any size, showing what our pictures show."""
 
-    def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, height: int, width: int, groups: tuple[int, ...]
+    ) -> None:
         self._model = model
         limits = model.vis.global_
         # The off-screen buffer is a limit of the model, not of GL.
@@ -104,7 +136,7 @@ class _GLPainter:
         self._renderer: Any = mujoco.Renderer(model, height, width)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
-        self._option.geomgroup[list(PICTURE_GROUPS)] = 1
+        self._option.geomgroup[list(groups)] = 1
 
     def paint(self, data: mujoco.MjData, camera: int | str) -> UInt8[np.ndarray, "height width 3"]:
         """What the camera sees."""

@@ -22,6 +22,15 @@ PICTURE_GROUPS = (0, 1, 2, 4)  # group 4: markers that only pictures show
 _RAYS_PER_BUNDLE = 256
 _SHOWN, _HIDDEN = 0, 5  # geom groups, while rays are cast
 _FAR = 1e6  # half length that stands for an endless plane [m]
+# As plain integers: comparing an array with MuJoCo's own enumeration is a thousand times slower.
+_PLANE, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("PLANE", "SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
+)
+_IS_PRIMITIVE = np.isin(
+    np.arange(int(mujoco.mjtGeom.mjGEOM_TRIANGLE) + 1),
+    (_PLANE, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX),
+)
 
 
 @dataclass(frozen=True)
@@ -127,7 +136,7 @@ def cast_rays(
     vectors = rotated(bundles.directions, rotation).ravel()
     scale, geom_id = np.full(count, -1.0), np.full(count, -1, np.int32)
     normal = np.zeros(3 * count)
-    reached = _reached(model, data, origin, bundles.planes @ rotation.T) & shown
+    reached = _reached(model, data, origin, bundles.planes @ rotation.T, np.flatnonzero(shown))
     groups = np.where(reached, _SHOWN, _HIDDEN).astype(np.int32)
     busy = reached.any(axis=1)
     mask = np.zeros(6, np.uint8)
@@ -170,7 +179,8 @@ def rotated(
 
 def visible_geoms(model: mujoco.MjModel, groups: tuple[int, ...] = VISIBLE_GROUPS) -> np.ndarray:
     """`(ngeom,)` bool: in one of the groups and not fully transparent."""
-    return np.isin(model.geom_group, groups) & (geom_colours(model)[:, 3] > 0)
+    among = np.array([group in groups for group in range(mujoco.mjNGROUP)])
+    return among[model.geom_group] & (geom_colours(model)[:, 3] > 0)
 
 
 def geom_colours(model: mujoco.MjModel) -> Float[np.ndarray, "ngeom 4"]:
@@ -190,21 +200,15 @@ def geom_boxes(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """
     kind, size = model.geom_type, model.geom_size
     centre, half = model.geom_aabb[:, :3].copy(), model.geom_aabb[:, 3:].copy()
-    geom = mujoco.mjtGeom
-    primitive = np.isin(
-        kind,
-        (geom.mjGEOM_SPHERE, geom.mjGEOM_CAPSULE, geom.mjGEOM_CYLINDER, geom.mjGEOM_ELLIPSOID)
-        + (geom.mjGEOM_BOX, geom.mjGEOM_PLANE),
-    )
-    centre[primitive] = 0.0
-    as_is = (kind == geom.mjGEOM_BOX) | (kind == geom.mjGEOM_ELLIPSOID)
+    centre[_IS_PRIMITIVE[kind]] = 0.0
+    as_is = (kind == _BOX) | (kind == _ELLIPSOID)
     half[as_is] = size[as_is]
-    sphere = kind == geom.mjGEOM_SPHERE
+    sphere = kind == _SPHERE
     half[sphere] = size[sphere, :1]
-    capsule, cylinder = kind == geom.mjGEOM_CAPSULE, kind == geom.mjGEOM_CYLINDER
+    capsule, cylinder = kind == _CAPSULE, kind == _CYLINDER
     half[cylinder] = size[cylinder][:, [0, 0, 1]]
     half[capsule] = size[capsule][:, [0, 0, 1]] + size[capsule, :1] * np.array([0.0, 0.0, 1.0])
-    half[kind == geom.mjGEOM_PLANE] = (_FAR, _FAR, 0.0)
+    half[kind == _PLANE] = (_FAR, _FAR, 0.0)
     return centre, half
 
 
@@ -213,18 +217,23 @@ def _reached(
     data: mujoco.MjData,
     origin: Float[np.ndarray, "3"],
     planes: Float[np.ndarray, "k 4 3"],
+    shown: Int[np.ndarray, "g"],
 ) -> np.ndarray:
-    """`(k, ngeom)` bool: whether the geom's box is not wholly behind one of the bundle's planes."""
+    """`(k, ngeom)` bool: a shown geom whose box is not wholly behind one of the bundle's planes."""
+    found = np.zeros((len(planes), model.ngeom), bool)
     if not len(planes):
-        return np.zeros((0, model.ngeom), bool)
-    centre, half = geom_boxes(model)
-    xmat = data.geom_xmat.reshape(-1, 3, 3)
-    centre = data.geom_xpos + np.einsum("gij,gj->gi", xmat, centre) - origin
+        return found
+    centre, half = (box[shown] for box in geom_boxes(model))
+    xmat = data.geom_xmat[shown].reshape(-1, 3, 3)
+    centre = data.geom_xpos[shown] + np.einsum("gij,gj->gi", xmat, centre) - origin
     normals = planes.reshape(-1, 3)
     reach = normals @ centre.T
     for axis in range(3):
         reach += np.abs(normals @ (xmat[:, :, axis] * half[:, axis, None]).T)
-    return (reach >= -1e-9 * (1 + np.abs(reach))).reshape(len(planes), 4, -1).all(axis=1)
+    # The last bits of a box that ends in a plane must not hide it.
+    met = reach >= -1e-9 * (1 + np.abs(reach))
+    found[:, shown] = met.reshape(len(planes), 4, -1).all(axis=1)
+    return found
 
 
 @contextmanager

@@ -59,9 +59,24 @@ class RayPainter:
     """Paints a model's cameras at one size; keeps what does not change between frames."""
 
     def __init__(
-        self, model: mujoco.MjModel, height: int, width: int, look: RayLook | None = None
+        self,
+        model: mujoco.MjModel,
+        height: int,
+        width: int,
+        look: RayLook | None = None,
+        *,
+        groups: tuple[int, ...] = PICTURE_GROUPS,
     ) -> None:
-        self._model = model
+        """Prepares.
+
+        Args:
+          model: The compiled model.
+          height: In pixels.
+          width: In pixels.
+          look: Light and sky.
+          groups: Of the geoms that are shown.
+        """
+        self._model, self._groups = model, groups
         self._size = (height, width)
         self._look = look or RayLook()
         self._colours = SurfaceColours(model)
@@ -99,6 +114,9 @@ class RayPainter:
             picture[rough] = fine.reshape(-1, samples**2, 3).mean(axis=1)
         return np.round(255 * picture).astype(np.uint8)
 
+    def close(self) -> None:
+        """Nothing to free."""
+
     def _trace(
         self,
         data: mujoco.MjData,
@@ -109,7 +127,7 @@ class RayPainter:
     ) -> Float[np.ndarray, "n 3"]:
         """Display values in 0..1 along the rays of the given slopes; `turn` is each ray's light."""
         alpha = geom_colours(self._model)[:, 3]
-        shown = visible_geoms(self._model, PICTURE_GROUPS)
+        shown = visible_geoms(self._model, self._groups)
         rays = np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
         rays = rotated(rays, T_world_camera[:3, :3])
         unit = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)

@@ -13,12 +13,23 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from manipose_mj.poses import quaternion_to_rotation
 from manipose_mj.ppf_jax.clouds import CloudBatch
 from manipose_mj.ppf_jax.features import Cloud, normalised
-from manipose_mj.ppf_jax.model import PoseModel, cast_votes, first_votes, refine
+from manipose_mj.ppf_jax.model import (
+    Evidence,
+    PoseModel,
+    cast_votes,
+    first_votes,
+    joined,
+    read,
+    refine,
+    refine_related,
+)
 from manipose_mj.ppf_jax.network import PairVotes
-from manipose_mj.ppf_jax.refinement import LEVELS, faced, free_space
+from manipose_mj.ppf_jax.refinement import LEVELS, Reading, faced, free_space
+from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.rotations import from_vector, to_vector
+from manipose_mj.ppf_jax.stretching import stretched
 from manipose_mj.ppf_jax.symmetry import nearest_equivalent, vote_cosines
-from manipose_mj.ppf_jax.voting import Hypotheses, agreement, vote
+from manipose_mj.ppf_jax.voting import Hypotheses, vote
 
 # A frame that is further off is beyond correction; only the judge learns from it [rad].
 _CORRECTABLE = 1.0
@@ -29,18 +40,23 @@ class LossConfig:
     """How many frames of each kind the refiner is shown of a cloud, and how far these are off.
 
     Attributes:
+      stretch: Logarithm of the largest factor by which an object is stretched along an axis.
       pairs: Votes of a cloud.
       noised: The true frame, turned and shifted a little, evenly in the logarithm of how much.
       confused: Frames as they are mistaken: half turns, any turn about X, any turn at all.
       own: The voting network's hypotheses as they are, and as many that are refined already.
+      related: Noised frames and what they may be mistaken for, refined as in an estimate. A third of
+        them are the former, so that the judge cannot tell by how they came about.
       turn: Least and most of a noised frame [rad].
       shift: Least and most, in the cloud's units.
     """
 
+    stretch: float = 0.1
     pairs: int = 1000
     noised: int = 3
-    confused: int = 2
+    confused: int = 1
     own: int = 2
+    related: int = 4
     turn: tuple[float, float] = (float(np.radians(0.3)), float(np.radians(40.0)))
     shift: tuple[float, float] = (0.005, 0.5)
 
@@ -62,7 +78,8 @@ def cloud_loss(
       config: What is asked.
       key: Draws pairs, frames and free space.
     """
-    keys = jax.random.split(key, 6)
+    keys = jax.random.split(key, 7)
+    sample = stretched(sample, config.stretch, key=keys[6])
     cloud = normalised(sample.points, sample.normals, sample.mask)
     rotation = sample.pose[:3, :3]
     origin = (sample.pose[:3, 3] - cloud.centre) / cloud.scale
@@ -77,15 +94,33 @@ def cloud_loss(
     free = free_space(cloud, model.config.refinement, key=keys[1])
     right = jnp.broadcast_to(rotation, (config.noised, 3, 3))
     wrong = _mistaken(rotation, config.confused, key=keys[2])
-    frames = _joined(
+    few = first_votes(votes, model.config.voting.coarse_votes)
+    seen = Evidence(cloud, few, guessed, free)
+    frames = joined(
         _noised(jnp.concatenate([right, wrong]), origin, config, key=keys[3]),
-        _own(model, cloud, votes, guessed, free, config, key=keys[4]),
+        _own(model, seen, votes, config, key=keys[4]),
+        _related(model, seen, rotation, origin, config, key=keys[5]),
     )
     frames = faced(frames, cloud, symmetry)
-    few = first_votes(votes, model.config.voting.coarse_votes)
-    agrees = agreement(few, frames, symmetry)
-    reading = model.refiner.read(cloud, free, guessed, frames, agrees)
+    reading = read(model, seen, frames)
+    parts |= refinement_losses(reading, frames, cloud, sample)
+    return sum(parts.values(), start=jnp.zeros(())), parts
 
+
+def refinement_losses(
+    reading: Reading, frames: Hypotheses, cloud: Cloud, sample: CloudBatch
+) -> dict[str, Float[Array, ""]]:
+    """How far corrections of frames miss the nearest equivalent label, and how wrongly they are judged.
+
+    Args:
+      reading: What the refiner reads in each frame.
+      frames: As they were given to it.
+      cloud: That they are supposed of.
+      sample: Where its label is.
+    """
+    rotation = sample.pose[:3, :3]
+    origin = (sample.pose[:3, 3] - cloud.centre) / cloud.scale
+    log_extents = jnp.log(sample.extents / cloud.scale)
     nearest = jax.vmap(
         lambda estimate: nearest_equivalent(
             estimate, rotation, sample.turns, sample.turn_mask, sample.axial
@@ -94,16 +129,17 @@ def cloud_loss(
     inverse = jnp.swapaxes(frames.rotation, 1, 2)
     turn = to_vector(inverse @ nearest)
     shift = jnp.einsum("hij,hj->hi", inverse, origin - frames.origin)
-    angle, distance = (jnp.sqrt(jnp.sum(v**2, axis=-1) + 1e-10) for v in (turn, shift))
+    angle, distance = _length(turn), _length(shift)
     near = angle < _CORRECTABLE
-    # Errors count against what there was to correct, so that small ones are learnt too.
-    off = jnp.sum(jnp.abs(reading.turn - turn), axis=-1) / (0.05 + angle)
-    off += jnp.sum(jnp.abs(reading.shift - shift), axis=-1) / (0.05 + distance)
-    off += jnp.sum(jnp.abs(reading.log_extents - log_extents), axis=-1)
-    parts["refine"] = jnp.sum(jnp.where(near, off, 0.0)) / jnp.maximum(jnp.sum(near), 1)
+    # Not divided by what there is to correct: small errors would then outweigh the large ones, and a
+    # training starts from features that tell only of these.
+    off = _length(reading.turn - turn) + _length(reading.shift - shift)
+    off += jnp.mean(jnp.abs(reading.log_extents - log_extents), axis=-1)
     within = jnp.stack([(angle <= a) & (distance * cloud.scale <= d) for a, d in LEVELS], axis=-1)
-    parts["judge"] = jnp.mean(optax.sigmoid_binary_cross_entropy(reading.logits, within))
-    return sum(parts.values(), start=jnp.zeros(())), parts
+    return {
+        "refine": jnp.sum(jnp.where(near, off, 0.0)) / jnp.maximum(jnp.sum(near), 1),
+        "judge": jnp.mean(optax.sigmoid_binary_cross_entropy(reading.logits, within)),
+    }
 
 
 def vote_losses(
@@ -135,8 +171,8 @@ def vote_losses(
     }
 
 
-def _joined(*groups: Hypotheses) -> Hypotheses:
-    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *groups)
+def _length(vectors: Float[Array, "n 3"]) -> Float[Array, "n"]:
+    return jnp.sqrt(jnp.sum(vectors**2, axis=-1) + 1e-10)
 
 
 def _noised(
@@ -173,22 +209,34 @@ def _mistaken(
 
 
 def _own(
-    model: PoseModel,
-    cloud: Cloud,
-    votes: PairVotes,
-    log_extents: Float[Array, "3"],
-    free: Float[Array, "m 3"],
-    config: LossConfig,
-    *,
-    key: PRNGKeyArray,
+    model: PoseModel, seen: Evidence, votes: PairVotes, config: LossConfig, *, key: PRNGKeyArray
 ) -> Hypotheses:
     """Some of the hypotheses that the votes give, before and after refinement."""
     symmetry = model.config.symmetry
     found = vote(votes, symmetry, model.config.voting)
     rows = jax.random.permutation(key, len(found.origin))[: config.own]
-    found = faced(jax.tree.map(lambda leaf: leaf[rows], found), cloud, symmetry)
-    few = first_votes(votes, model.config.voting.coarse_votes)
-    fixed = jax.lax.stop_gradient(model)
-    steps = model.config.refinement.steps - 1
-    refined = refine(fixed, cloud, few, log_extents, free, found, steps)
-    return jax.lax.stop_gradient(_joined(found, refined))
+    found = faced(jax.tree.map(lambda leaf: leaf[rows], found), seen.cloud, symmetry)
+    refined = refine(jax.lax.stop_gradient(model), seen, found, model.config.refinement.steps)
+    return jax.lax.stop_gradient(joined(found, refined))
+
+
+def _related(
+    model: PoseModel,
+    seen: Evidence,
+    rotation: Float[Array, "3 3"],
+    origin: Float[Array, "3"],
+    config: LossConfig,
+    *,
+    key: PRNGKeyArray,
+) -> Hypotheses:
+    """What is easily mistaken for the true frame, as well as can be: the judge's hard cases."""
+    right_key, kind_key, noise_key = jax.random.split(key, 3)
+    turns = jnp.concatenate([jnp.eye(3)[None], jnp.asarray(relatives(model.config.symmetry))])
+    kind = jax.random.randint(kind_key, (config.related,), 0, len(turns))
+    right = jax.random.bernoulli(right_key, 1 / 3, (config.related,))
+    frames = rotation @ turns[jnp.where(right, 0, kind)]
+    frames = faced(
+        _noised(frames, origin, config, key=noise_key), seen.cloud, model.config.symmetry
+    )
+    refined = refine_related(jax.lax.stop_gradient(model), seen, frames)
+    return jax.lax.stop_gradient(refined)

@@ -17,12 +17,15 @@ from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sample
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.refinement import (
     CONFIDENT_LEVEL,
+    Reading,
     RefinementConfig,
     Refiner,
     corrected,
+    expected_turn,
     faced,
     free_space,
 )
+from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import Hypotheses, VotingConfig, agreement, vote
 
@@ -107,6 +110,39 @@ class Estimates(eqx.Module):
     voted: Float[Array, "h 4 4"]
 
 
+class Evidence(eqx.Module):
+    """What hypotheses about a cloud are held against.
+
+    Attributes:
+      cloud: The cloud.
+      votes: Some of its votes.
+      log_extents: What the voting network takes the lengths for, in the cloud's units.
+      free: `(m, 3)`, points that the camera looked through, in the cloud's units.
+    """
+
+    cloud: Cloud
+    votes: PairVotes
+    log_extents: Float[Array, "3"]
+    free: Float[Array, "m 3"]
+
+    def fewer(self, points: int) -> Evidence:
+        """The same with the first, which are random, of the cloud's points."""
+        cloud = self.cloud
+        return Evidence(
+            Cloud(
+                points=cloud.points[:points],
+                normals=cloud.normals[:points],
+                views=cloud.views[:points],
+                mask=cloud.mask[:points],
+                centre=cloud.centre,
+                scale=cloud.scale,
+            ),
+            self.votes,
+            self.log_extents,
+            self.free,
+        )
+
+
 def estimate_cloud(
     model: PoseModel,
     points: Float[Array, "n 3"],
@@ -115,7 +151,9 @@ def estimate_cloud(
     *,
     key: PRNGKeyArray,
 ) -> Estimates:
-    """Vote, refine every hypothesis, judge, rank. A pure function of one cloud: `vmap` it.
+    """Vote, refine, add what the best may be mistaken for, refine that, judge all, rank.
+
+    A pure function of one cloud: `vmap` it.
 
     Args:
       model: The networks.
@@ -131,9 +169,18 @@ def estimate_cloud(
     first = faced(vote(votes, config.symmetry, config.voting), cloud, config.symmetry)
     free = free_space(cloud, config.refinement, key=free_key)
     few = first_votes(votes, config.voting.coarse_votes)
-    refined = refine(model, cloud, few, log_extents, free, first, config.refinement.steps)
-    agrees = agreement(few, refined, config.symmetry)
-    reading = model.refiner.read(cloud, free, log_extents, refined, agrees)
+    seen = Evidence(cloud, few, log_extents, free)
+    refined = refine(model, seen, first, config.refinement.steps)
+    reading = read(model, seen, refined)
+    likeliest = jnp.argmin(expected_turn(reading.logits))
+    kin = related(refined.rotation[likeliest], refined.origin[likeliest], seen, config.symmetry)
+    others = refine_related(model, seen, kin)
+    count = len(refined.origin)
+    reading = joined(reading, read(model, seen, others))
+    # Judged alike, a frame that the votes led to is the better bet.
+    handicap = config.refinement.related_handicap * (np.arange(len(reading.turn)) >= count)
+    off = expected_turn(reading.logits) + handicap
+    refined, first = joined(refined, others), joined(first, kin)
     likely = jax.nn.sigmoid(reading.logits)
     poses = metric_poses(refined, cloud)
     extents = jnp.exp(jnp.clip(reading.log_extents, -6.0, 6.0)) * cloud.scale
@@ -142,7 +189,7 @@ def estimate_cloud(
     poses = jnp.where(sound[:, None, None], poses, compose(jnp.eye(3), cloud.centre))
     extents = jnp.where(jnp.isfinite(extents), extents, cloud.scale)
     likely = jnp.where(sound[:, None], likely, 0.0)
-    order = jnp.argsort(-jnp.sum(likely, axis=-1))
+    order = jnp.argsort(jnp.where(sound, off, jnp.inf))
     return Estimates(
         poses=poses[order],
         extents=extents[order],
@@ -172,24 +219,38 @@ def estimate_batch(
     return jax.lax.map(one, rows, batch_size=AT_ONCE)
 
 
-def refine(
-    model: PoseModel,
-    cloud: Cloud,
-    votes: PairVotes,
-    log_extents: Float[Array, "3"],
-    free: Float[Array, "m 3"],
-    hypotheses: Hypotheses,
-    steps: int,
-) -> Hypotheses:
+def refine(model: PoseModel, seen: Evidence, hypotheses: Hypotheses, steps: int) -> Hypotheses:
     """Hypotheses after `steps` corrections by what the refiner reads in each."""
-    symmetry = model.config.symmetry
 
     def step(current: Hypotheses, _: None) -> tuple[Hypotheses, None]:
-        agrees = agreement(votes, current, symmetry)
-        reading = model.refiner.read(cloud, free, log_extents, current, agrees)
-        return faced(corrected(current, reading), cloud, symmetry), None
+        after = corrected(current, read(model, seen, current))
+        return faced(after, seen.cloud, model.config.symmetry), None
 
     return jax.lax.scan(step, hypotheses, None, length=steps)[0]
+
+
+def related(
+    rotation: Float[Array, "3 3"],
+    origin: Float[Array, "3"],
+    seen: Evidence,
+    symmetry: CommonSymmetry,
+) -> Hypotheses:
+    """The frames that a frame may be mistaken for, about the same origin."""
+    turned = rotation @ jnp.asarray(relatives(symmetry))
+    origins = jnp.broadcast_to(origin, (len(turned), 3))
+    return faced(Hypotheses(turned, origins), seen.cloud, symmetry)
+
+
+def refine_related(model: PoseModel, seen: Evidence, hypotheses: Hypotheses) -> Hypotheses:
+    """`refine` for the many that are wrong but for one: on fewer points."""
+    config = model.config.refinement
+    return refine(model, seen.fewer(config.related_points), hypotheses, config.related_steps)
+
+
+def read(model: PoseModel, seen: Evidence, hypotheses: Hypotheses) -> Reading:
+    """What the refiner reads in each hypothesis."""
+    agrees = agreement(seen.votes, hypotheses, model.config.symmetry)
+    return model.refiner.read(seen.cloud, seen.free, seen.log_extents, hypotheses, agrees)
 
 
 def cast_votes(
@@ -210,3 +271,8 @@ def first_votes(votes: PairVotes, count: int) -> PairVotes:
 def metric_poses(hypotheses: Hypotheses, cloud: Cloud) -> Float[Array, "h 4 4"]:
     """`T_camera_label` [m] of hypotheses in a cloud's units."""
     return compose(hypotheses.rotation, hypotheses.origin * cloud.scale + cloud.centre)
+
+
+def joined(*groups: Any) -> Any:
+    """Pytrees of one structure, one after the other along their first axes."""
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *groups)

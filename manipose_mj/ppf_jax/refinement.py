@@ -28,6 +28,8 @@ LEVELS: tuple[tuple[float, float], ...] = (
     (float(np.radians(15.0)), 0.02),
     (float(np.radians(45.0)), 0.05),
 )
+# How far a frame is off, about, within each level but not the one before, and beyond them all [rad].
+_TYPICAL_TURNS = np.radians([2.5, 10.0, 30.0, 110.0])
 CONFIDENT_LEVEL = 1  # the level whose probability is reported as confidence
 _FARTHEST_TURN = 1.0  # of one correction [rad]
 _INPUTS = 10
@@ -40,14 +42,20 @@ class RefinementConfig:
     Attributes:
       widths: Of the layers on points.
       hidden: Of the layer on the pooled features.
-      steps: Corrections of each hypothesis.
+      steps: Corrections of each hypothesis that the votes give.
+      related_steps: Corrections of what the best of these may be mistaken for.
+      related_points: Points of the cloud that these corrections look at.
+      related_handicap: By how much one of these must be judged less far off to be preferred [rad].
       free_points: Points of empty space.
       free_reach: How far from the surface these are at most, in units of the cloud's size.
     """
 
     widths: tuple[int, int] = (64, 128)
     hidden: int = 128
-    steps: int = 3
+    steps: int = 2
+    related_steps: int = 3
+    related_points: int = 128
+    related_handicap: float = float(np.radians(10.0))
     free_points: int = 64
     free_reach: float = 2.0
 
@@ -154,6 +162,15 @@ class Refiner(eqx.Module):
                 cloud, free, log_extents, rotation, origin, agrees
             )
         )(hypotheses.rotation, hypotheses.origin, agreement)
+
+
+def expected_turn(logits: Float[Array, "*b levels"]) -> Float[Array, "*b"]:
+    """How far off a frame is on average, if it is within each of `LEVELS` as likely as judged [rad].
+
+    The least of these is the best answer where nothing tells equivalent turns apart, as those of a mug
+    whose handle is hidden; the likeliest to be right may be at the end of what is possible.
+    """
+    return _TYPICAL_TURNS[-1] - jax.nn.sigmoid(logits) @ jnp.asarray(np.diff(_TYPICAL_TURNS))
 
 
 def corrected(hypotheses: Hypotheses, reading: Reading) -> Hypotheses:

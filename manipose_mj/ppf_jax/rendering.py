@@ -17,10 +17,10 @@ from scipy.ndimage import gaussian_filter, zoom
 from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.depth_noise import KINECT, structured_light
+from manipose_mj.mjcf.depth_normals import depth_normals
 from manipose_mj.mjcf.ray_camera import Intrinsics
 from manipose_mj.poses import transform
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, LabelledCloud
-from manipose_mj.ppf_jax.depth_normals import depth_normals
 from manipose_mj.ppf_jax.occlusion import Occluder, nearer, occluded
 from manipose_mj.ppf_jax.rasteriser import Raster, Triangles, pixel_rays, rasterise
 from manipose_mj.ppf_jax.view_settings import Placement, ViewSetting, place

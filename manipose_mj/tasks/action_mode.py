@@ -93,20 +93,19 @@ class JointPositions:
         self._action = np.array(memory)
 
 
-def checked_action(mode: ActionMode, action: object) -> Float[np.ndarray, "n"]:
-    """The action as an array of the mode's shape.
+def checked_action(mode: str, shape: tuple[int, ...], action: object) -> Float[np.ndarray, "n"]:
+    """The action as an array of the shape that the mode of this name takes.
 
     Raises:
       InputError: It has another shape, or a value that is no finite number.
     """
-    expected = mode.spec().shape
     try:
         array = np.asarray(action, float)
     except (TypeError, ValueError):
         array = np.empty(0)
-    if array.shape != expected or not np.isfinite(array).all():
+    if array.shape != shape or not np.isfinite(array).all():
         raise InputError(
             f"action has shape {array.shape} and values {array.ravel()[:8].tolist()}; "
-            f"{mode.name} expects {expected[0]} finite numbers"
+            f"{mode} expects {shape[0]} finite numbers"
         )
     return array

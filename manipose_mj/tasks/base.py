@@ -10,22 +10,24 @@ import numpy as np
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_env import specs
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
 from manipose_mj.mjcf.arena import TableArena
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
 from manipose_mj.mjcf.panda import HOME, MAX_OPENING, Panda
+from manipose_mj.mjcf.sleep import static_things_moving
 from manipose_mj.poses import pose_error
 from manipose_mj.tasks.action_mode import checked_action
 from manipose_mj.tasks.goals import Goal, PoseGoal, all_met
-from manipose_mj.tasks.observations import SensorObservables, parse_modes
+from manipose_mj.tasks.observations import SensorObservables, Slots
 from manipose_mj.tasks.options import TaskConfig, TaskOptions
+from manipose_mj.tasks.posed_things import Carried, wanted_poses
 from manipose_mj.tasks.randomisation import Delay, Randomiser, randomisation
-from manipose_mj.tasks.scene_state import ObjectState, PartState, SceneState
+from manipose_mj.tasks.scene_reader import SceneReader
+from manipose_mj.tasks.scene_state import SceneState
 from manipose_mj.tasks.shaping import dense_reward
 
 CONTROL_TIMESTEP = 0.02
-SETTLE_TIME = 0.3
 
 
 class ManipulationTask(composer.Task):
@@ -46,18 +48,30 @@ class ManipulationTask(composer.Task):
         self.control_timestep = CONTROL_TIMESTEP
         self.success_now = self.success_once = False
         self.max_penetration = 0.0
-        self._owners: dict[composer.Entity, Int[np.ndarray, "ngeom"]] = {}
-        self._substep = 0
+        self._reader: SceneReader | None = None
+        self._action_shape = options.action_mode.spec().shape
+        self._substep, self._substeps = 0, self.physics_steps_per_control_step
         self._randomiser = Randomiser(randomisation(options.randomisation))
         self._delay = Delay()
+        self._target = np.zeros(8)
+        self.noise_seed: int | None = None  # of the sensors, in this episode
 
-    def _finish_build(self, pose_observables: Mapping[str, observable.Observable]) -> None:
-        """Add the observables; call once the scene is complete."""
+    def _finish_build(
+        self, pose_observables: Mapping[str, observable.Observable] | None = None
+    ) -> None:
+        """Add the observables; call once the scene is complete.
+
+        Args:
+          pose_observables: More for the mode `pose`; the poses of `movable`, of furniture and of goals
+            are there anyway.
+        """
         options = self.options
-        self._sensors = SensorObservables(self._instances, self._arena, options.sensors)
-        self._task_observables = self._sensors.build(options.observations, pose_observables)
-        if "state" in parse_modes(options.observations):
-            self.robot.observables.enable_all()
+        furniture = (e for e in self._instances.values() if isinstance(e, ArticulatedObject))
+        slots = Slots(self.object_slots, self.goal_slots, tuple(furniture))
+        self._sensors = SensorObservables(
+            self, slots, self._instances, self._arena, options.sensors, options.observations
+        )
+        self._task_observables = self._sensors.build(pose_observables or {})
 
     # What a subclass says about its goal.
 
@@ -77,6 +91,23 @@ class ManipulationTask(composer.Task):
         return ()
 
     @property
+    def object_slots(self) -> tuple[str, ...]:
+        """Every name that `movable` has in any episode; observations are named for them."""
+        return tuple(self.movable)
+
+    @property
+    def landmarks(self) -> Mapping[str, Carried]:
+        """More frames to observe, such as those of the part in question; of one set of names."""
+        return {}
+
+    @property
+    def goal_slots(self) -> tuple[str, ...]:
+        """The observed goal poses of any episode: `goal` where there is one at most, else
+        `goal_` and the object's name of each."""
+        things = tuple(wanted_poses(self.goals, self.movable))
+        return ("goal",) * len(things) if len(things) < 2 else tuple(f"goal_{n}" for n in things)
+
+    @property
     @abc.abstractmethod
     def object_name(self) -> str:
         """The asset that this episode is about."""
@@ -89,37 +120,11 @@ class ManipulationTask(composer.Task):
 
     def scene_state(self, physics: mjcf.Physics) -> SceneState:
         """The state that goals and rewards are functions of."""
-        touched, held = self._touching(physics)
-        objects = {}
-        for name, entity in self.movable.items():
-            linear, angular = entity.speeds(physics)
-            objects[name] = ObjectState(
-                label=entity.asset.label,
-                label_pose=entity.label_pose(physics),
-                linear_speed=np.asarray(linear),
-                angular_speed=np.asarray(angular),
-                touched=np.asarray(bool(self._geoms_of(physics, entity)[touched].any())),
-                held=np.asarray(all(self._geoms_of(physics, entity)[g].any() for g in held)),
-            )
-        parts = {}
-        for furniture in self.furnishings:
-            for part in furniture.asset.parts:
-                pose = furniture.part_pose(physics, part.name)
-                parts[part.name] = PartState(
-                    part=part,
-                    opening=np.asarray(furniture.opening(physics, part.name)),
-                    handle_pose=furniture.handle_pose(physics, part.name) if part.handle else pose,
-                    cavity_pose=furniture.cavity_pose(physics, part.name) if part.cavity else pose,
-                    touched=np.asarray(
-                        bool(np.isin(touched, furniture.part_geoms(physics, part.name)).any())
-                    ),
-                )
-        return SceneState(
-            tcp_pose=self.robot.tcp_pose(physics),
-            gripper=np.asarray(self.robot.configuration(physics)[1]),
-            objects=objects,
-            parts=parts,
-        )
+        if self._reader is None or not self._reader.reads(physics):
+            objects = [e for e in self._instances.values() if isinstance(e, RigidObject)]
+            pieces = [e for e in self._instances.values() if isinstance(e, ArticulatedObject)]
+            self._reader = SceneReader(physics, self.robot, objects, pieces)
+        return self._reader.read(physics, self.movable, self.furnishings)
 
     def succeeded(self, physics: mjcf.Physics) -> bool:
         """Whether all goals are met now."""
@@ -139,6 +144,10 @@ class ManipulationTask(composer.Task):
         if not errors:
             return None
         return float(max(e[0] for e in errors)), float(max(e[1] for e in errors))
+
+    def close(self) -> None:
+        """Free what the sensors hold."""
+        self._sensors.close()
 
     def forget_images(self) -> None:
         """Drop what was rendered: the state has been changed from outside."""
@@ -162,9 +171,6 @@ class ManipulationTask(composer.Task):
     def action_spec(self, physics: mjcf.Physics) -> specs.BoundedArray:
         return self.options.action_mode.spec()
 
-    def initialize_episode_mjcf(self, random_state: np.random.RandomState) -> None:
-        self._owners.clear()
-
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
@@ -174,14 +180,19 @@ class ManipulationTask(composer.Task):
             latency = self._randomise(physics, random_state)
         self.robot.set_configuration(physics, HOME, MAX_OPENING)
         self._delay.start(round(latency / self.physics_timestep), np.append(HOME, MAX_OPENING))
-        self.place_objects(physics, random_state)
-        # dm_control's step begins with the second half of the last one.
-        physics.forward()
-        physics.step(round(SETTLE_TIME / self.physics_timestep))
+        with static_things_moving(physics):
+            self.place_objects(physics, random_state)
+            # dm_control's step begins with the second half of the last one.
+            physics.forward()
+        physics.step(round(self.config.settle / self.physics_timestep))
         physics.data.time = 0.0
         self.options.action_mode.reset(physics, self.robot)
+        self._action_shape = self.options.action_mode.spec().shape  # the mode may have been changed
         self.success_now = self.success_once = False
         self.max_penetration = 0.0
+        # Drawn whatever the sensors: the next episode shall not depend on what is observed.
+        self.noise_seed = int(random_state.randint(2**31))
+        self._sensors.forget()
 
     def before_step(
         self,
@@ -190,7 +201,7 @@ class ManipulationTask(composer.Task):
         random_state: np.random.RandomState,
     ) -> None:
         mode = self.options.action_mode
-        mode.begin(physics, self.robot, checked_action(mode, action))
+        mode.begin(physics, self.robot, checked_action(mode.name, self._action_shape, action))
         self._substep = 0
 
     def before_substep(
@@ -200,16 +211,15 @@ class ManipulationTask(composer.Task):
         random_state: np.random.RandomState,
     ) -> None:
         self._substep += 1
-        share = self._substep / self.physics_steps_per_control_step
-        joints, opening = self.options.action_mode.targets(physics, self.robot, share)
-        arrived = self._delay.through(np.append(joints, opening))
-        self.robot.apply_targets(physics, arrived[:7], float(arrived[7]))
+        share = self._substep / self._substeps
+        target = self._target
+        target[:7], target[7] = self.options.action_mode.targets(physics, self.robot, share)
+        self.robot.follow_targets(physics, self._delay.through(target))
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        if physics.data.ncon:
-            self.max_penetration = max(
-                self.max_penetration, -float(physics.data.contact.dist.min())
-            )
+        data = physics.data.ptr
+        if len(data.contact.dist):  # none are computed between things asleep
+            self.max_penetration = max(self.max_penetration, -float(data.contact.dist.min()))
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         self.success_now = self.succeeded(physics)
@@ -218,37 +228,25 @@ class ManipulationTask(composer.Task):
     def get_reward(self, physics: mjcf.Physics) -> float:
         if self.options.reward == "sparse" or self.success_now:
             return float(self.success_now)
-        state = self.scene_state(physics)
-        return min(float(dense_reward(self.goals, state, self.config.tolerance)), 0.999)
+        return self.reward_of(self.scene_state(physics), self.goals)
+
+    def reward_of(self, state: SceneState, goals: tuple[Goal, ...]) -> float:
+        """The reward, of this task's kind, of a state of its scene against any goals."""
+        success = bool(all_met(goals, state, self.config.tolerance))
+        if self.options.reward == "sparse" or success:
+            return float(success)
+        return min(float(dense_reward(goals, state, self.config.tolerance)), 0.999)
 
     def _randomise(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> float:
         objects = [e for e in self._instances.values() if isinstance(e, RigidObject)]
         pads = np.asarray(physics.bind(self.robot.pad_geoms).element_id)
         return self._randomiser.apply(physics, objects, pads.tolist(), random_state)
 
-    # Contacts
-
-    def _geoms_of(self, physics: mjcf.Physics, entity: composer.Entity) -> Bool[np.ndarray, "g"]:
-        """A mask over geom ids, `(ngeom,)`, looked up once per compiled model."""
-        if entity not in self._owners:
-            mask = np.zeros(physics.model.ngeom, bool)
-            mask[physics.bind(entity.mjcf_model.find_all("geom")).element_id] = True
-            self._owners[entity] = mask
-        return self._owners[entity]
-
-    def _touching(
-        self, physics: mjcf.Physics
-    ) -> tuple[Int[np.ndarray, "n"], tuple[Int[np.ndarray, "a"], Int[np.ndarray, "b"]]]:
-        """Ids of the geoms that the robot touches; and those that its left and right pad touch."""
-        contact = physics.data.contact
-        pairs = np.concatenate([contact.geom, contact.geom[:, ::-1]])
-        touching = pairs[self._geoms_of(physics, self.robot)[pairs[:, 0]]]
-        left, right = physics.bind(self.robot.pad_geoms).element_id
-        return touching[:, 1], (
-            touching[touching[:, 0] == left, 1],
-            touching[touching[:, 0] == right, 1],
-        )
-
     def touches_robot(self, physics: mjcf.Physics, entity: composer.Entity) -> bool:
         """Whether any geom of the robot touches any geom of the entity."""
-        return bool(self._geoms_of(physics, entity)[self._touching(physics)[0]].any())
+        geoms = physics.data.contact.geom
+        own, robots = (
+            np.isin(geoms, physics.bind(e.mjcf_model.find_all("geom")).element_id)
+            for e in (entity, self.robot)
+        )
+        return bool(np.any(own[:, 0] & robots[:, 1] | own[:, 1] & robots[:, 0]))

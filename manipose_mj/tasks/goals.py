@@ -92,6 +92,37 @@ class OrientationGoal:
 
 
 @dataclass(frozen=True)
+class UprightGoal:
+    """The object shall rest upright, its label's X along the vertical, turned about it as it likes;
+    anywhere, released."""
+
+    object: str
+
+    def error(self, state: SceneState) -> Float[Array, "*b"]:
+        """The angle between the label's X and the vertical [rad]."""
+        up = state.objects[self.object].label_pose[..., :3, 0]
+        xp = namespace(up)
+        # From the chord: the cosine is too flat near nothing and near half a turn.
+        chord = xp.sqrt(xp.sum((up - xp.asarray([0.0, 0.0, 1.0], dtype=up.dtype)) ** 2, axis=-1))
+        return 2 * xp.asin(xp.clip(chord / 2, 0.0, 1.0))
+
+    def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
+        """Whether it holds in this state."""
+        thing = state.objects[self.object]
+        rest = at_rest(thing.linear_speed, thing.angular_speed, tolerance)
+        on_table = thing.label_pose[..., 2, 3] > 0.0
+        return (self.error(state) < tolerance.rotation) & rest & on_table & ~thing.touched
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Reach, hold, turn, set down."""
+        thing = state.objects[self.object]
+        angle = self.error(state)
+        placed = (angle < tolerance.rotation) & (thing.label_pose[..., 2, 3] > 0.0)
+        left = shaping.turn_as_way(angle)
+        return shaping.object_progress(state, thing, placed, left, tolerance)
+
+
+@dataclass(frozen=True)
 class InsideGoal:
     """The whole object shall rest in the cavity that `part` opens, released."""
 
@@ -130,6 +161,58 @@ class InsideGoal:
             furniture.part.cavity.extents,
             tolerance.cavity_slack,
         )
+        by_itself = shaping.object_progress(state, thing, placed, left, tolerance)
+        return shaping.through_part(state, furniture, placed, by_itself)
+
+
+@dataclass(frozen=True)
+class TakenOutGoal:
+    """The object shall rest on the table with its label's origin over a level rectangle, out of the
+    cavity that `part` opens, released.
+
+    Attributes: center: of the rectangle, in the world [m]; half_sides: along x and y [m].
+    """
+
+    object: str
+    part: str
+    center: Float[np.ndarray, "2"]
+    half_sides: Float[np.ndarray, "2"]
+
+    def _beyond(self, state: SceneState) -> Float[Array, "*b 2"]:
+        """How far the label's origin is outside the rectangle, along x and y [m]."""
+        place = state.objects[self.object].label_pose[..., :2, 3]
+        xp = namespace(place)
+        center = xp.asarray(self.center, dtype=place.dtype)
+        half = xp.asarray(self.half_sides, dtype=place.dtype)
+        return xp.clip(xp.abs(place - center) - half, 0.0, None)
+
+    def placed(self, state: SceneState) -> Bool[Array, "*b"]:
+        """Whether it is over the rectangle, no higher than it can lie, and out of the cavity."""
+        thing, furniture = state.objects[self.object], state.parts[self.part]
+        pose = thing.label_pose
+        xp = namespace(pose)
+        over = xp.all(self._beyond(state) <= 0.0, axis=-1)
+        half_diagonal = float(np.linalg.norm(thing.label.extents)) / 2
+        low = (pose[..., 2, 3] > 0.0) & (pose[..., 2, 3] < half_diagonal + 0.01)
+        cavity = furniture.part.cavity
+        if cavity is None:
+            return over & low
+        in_cavity = (invert(furniture.cavity_pose) @ pose)[..., :3, 3]
+        half = xp.asarray(cavity.extents, dtype=pose.dtype) / 2
+        return over & low & xp.any(xp.abs(in_cavity) > half, axis=-1)
+
+    def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
+        """Whether it holds in this state."""
+        thing = state.objects[self.object]
+        rest = at_rest(thing.linear_speed, thing.angular_speed, tolerance)
+        return self.placed(state) & rest & ~thing.touched
+
+    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
+        """Open, reach, hold, carry to the rectangle, let go."""
+        thing, furniture = state.objects[self.object], state.parts[self.part]
+        beyond, placed = self._beyond(state), self.placed(state)
+        xp = namespace(beyond)
+        left = xp.sqrt(xp.sum(beyond**2, axis=-1))
         by_itself = shaping.object_progress(state, thing, placed, left, tolerance)
         return shaping.through_part(state, furniture, placed, by_itself)
 

@@ -39,7 +39,10 @@ class ObjectPool:
         )
         for index, entity in enumerate(self.entities):
             # Parked in the model too: objects that begin in one place would burst apart.
-            arena.add_free_entity(entity).pos = _parking_place(index)
+            frame = arena.add_free_entity(entity)
+            frame.pos = _parking_place(index)
+            # Left to itself MuJoCo puts the frame's 10 mg at `pos` from it: a lever of 50 m.
+            frame.add("inertial", pos=[0, 0, 0], mass=1e-5, diaginertia=[1e-11] * 3)
             for body in entity.mjcf_model.find_all("body"):
                 body.gravcomp = 1
 
@@ -47,7 +50,10 @@ class ObjectPool:
         """Give these their weight and park all; the caller then places those that are used."""
         for index, entity in enumerate(self.entities):
             entity.place(physics, compose(np.eye(3), _parking_place(index)))
-            physics.bind(entity.mjcf_model.find_all("body")).gravcomp = float(index not in indices)
+            # The frame too: with the least weight what is parked would never come to rest.
+            frame = mjcf.get_attachment_frame(entity.mjcf_model)
+            bodies = physics.bind([frame, *entity.mjcf_model.find_all("body")])
+            bodies.gravcomp = float(index not in indices)
 
 
 def _parking_place(index: int) -> Float[np.ndarray, "3"]:

@@ -1,145 +1,202 @@
-"""Observation modes: what a task shows, switched on by names joined with `+`."""
+"""Observation modes: what a task shows, switched on by names joined with `+`.
+
+Modes are `state` (the robot's joints and gripper), `pose`, `rgb`, `depth`, `segmentation` and `pointcloud`;
+each is a set of observables whose keys start with its name. A single key, such as `depth/front`, may
+stand in place of a mode. Images bring `camera/NAME/pose` (`T_world_camera`, OpenCV's axes) and
+`camera/NAME/intrinsics` with them.
+"""
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
+from dm_env import specs
 
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.mjcf.clouds import (
-    PointCloud,
-    cloud_from_depth,
-    fuse,
-    geom_instances,
-    pixel_instances,
-)
-from manipose_mj.mjcf.ray_camera import (
-    RayCamera,
-    RayImage,
-    camera_id,
-    camera_intrinsics,
-    camera_pose,
-)
+from manipose_mj.mjcf.clouds import PointCloud
+from manipose_mj.tasks.camera_rig import CameraRig
+from manipose_mj.tasks.cloud_observables import CloudObservables
+from manipose_mj.tasks.declared import Declared, Read, bounded, unbounded
+from manipose_mj.tasks.pose_observables import PoseObservables, Slots
+from manipose_mj.tasks.posed_things import PosedScene
+from manipose_mj.tasks.sensor_config import CameraView, PoseNoise, SensorConfig
 
-MODES = ("state", "pose", "depth", "segmentation", "pointcloud")
+__all__ = [
+    "MODES",
+    "CameraView",
+    "PoseNoise",
+    "SensorConfig",
+    "SensorObservables",
+    "Slots",
+    "parse_modes",
+]
 
-
-@dataclass(frozen=True)
-class SensorConfig:
-    """Attributes: cameras: names of cameras in the scene (`front`, `left`, `right`, `overview`,
-    `panda/wrist`); height, width: of their images [pixels]; cloud_size: points of the fused cloud."""
-
-    cameras: tuple[str, ...] = ("front", "left", "right")
-    height: int = 120
-    width: int = 160
-    cloud_size: int = 16384
+MODES = ("state", "pose", "rgb", "depth", "segmentation", "pointcloud")
+_IMAGES = ("rgb", "depth", "segmentation")
 
 
 def parse_modes(observations: str) -> tuple[str, ...]:
-    """The observation modes named in `observations`, such as `"state+pose"`.
+    """The modes and keys named in `observations`, such as `"state+pose+depth/front"`.
 
     Raises:
-      InputError: One of them is unknown, or there is none.
+      InputError: A mode is unknown, or there is none. Keys, which have a `/`, are checked when the
+        task that they are of is known.
     """
-    modes = tuple(observations.split("+"))
-    for mode in modes:
-        if mode not in MODES:
-            raise unknown_name("observation mode", mode, MODES)
-    return modes
+    parts = tuple(observations.split("+"))
+    for part in parts:
+        if "/" not in part and part not in MODES:
+            raise unknown_name("observation mode", part, MODES)
+    return parts
 
 
 class SensorObservables:
-    """Builds a task's observables; an image is rendered once for all that use it."""
+    """A task's observables; those of the modes asked for are enabled."""
 
     def __init__(
         self,
+        scene: PosedScene,
+        slots: Slots,
         instances: Mapping[str, composer.Entity],
         arena: composer.Arena,
         config: SensorConfig,
+        observations: str,
     ) -> None:
+        """Prepares; the arena must not be compiled yet.
+
+        Args:
+          scene: The task.
+          slots: What it may show in any episode.
+          instances: What segmentation tells apart, counted from 1.
+          arena: Gets the user's cameras.
+          config: Cameras, sizes, noise.
+          observations: Modes and keys, joined by `+`.
+
+        Raises:
+          InputError: A mode or camera is unknown, a camera has the name of another, or images are
+            asked for without a camera or a renderer.
+        """
+        self._parts = parse_modes(observations)
+        modes = {part.split("/")[0] for part in self._parts}
+        self._scene, self._slots, self._config = scene, slots, config
         self._entities = tuple(instances.values())
-        self._config = config
-        self._camera = RayCamera(config.height, config.width)
-        known = [c.full_identifier for c in arena.mjcf_model.find_all("camera")]
-        for name in config.cameras:
-            if name not in known:
-                raise unknown_name("camera", name, known)
-        if config.cloud_size < 1:
-            raise InputError(f"cloud_size is {config.cloud_size}; expected at least 1")
-        self._images: dict[str, tuple[float, Any]] = {}
+        self._robot = instances["robot"]
+        self._rig = CameraRig(config, arena, instances)
+        self._poses = PoseObservables(scene, self._robot, slots, self._rig.names, config.pose_noise)
+        self._clouds = CloudObservables(self._rig, config, shaded="rgb" in modes)
+        if not self._rig.names and modes & {*_IMAGES, "pointcloud"}:
+            raise InputError(f"observations {observations!r} need a camera; sensors name none")
+        if "rgb" in modes:
+            self._rig.require_renderer()
 
     def build(
-        self, observations: str, poses: Mapping[str, observable.Observable]
+        self, poses: Mapping[str, observable.Observable]
     ) -> OrderedDict[str, observable.Observable]:
-        """The task observables; those of the modes asked for are enabled."""
-        modes = parse_modes(observations)
+        """All observables of the task; the robot's own are switched on as asked for as well.
+
+        Args:
+          poses: More for the mode `pose`; those of objects, furniture and goals come by themselves.
+
+        Raises:
+          InputError: A key is unknown.
+        """
         built: OrderedDict[str, observable.Observable] = OrderedDict()
-        for name, pose in poses.items():
-            built[f"pose/{name}"] = pose
-        for camera in self._config.cameras:
-            built[f"depth/{camera}"] = observable.Generic(
-                lambda physics, name=camera: self._image(physics, name).depth
-            )
-            built[f"segmentation/{camera}"] = observable.Generic(
-                lambda physics, name=camera: self._segmentation(physics, name)
-            )
-        built["pointcloud/points"] = observable.Generic(lambda p: self.cloud(p).points_world)
-        built["pointcloud/normals"] = observable.Generic(lambda p: self.cloud(p).normals_world)
-        built["pointcloud/instance"] = observable.Generic(lambda p: self.cloud(p).instance)
-        for name, each in built.items():
-            each.enabled = name.split("/")[0] in modes
+        own = self._poses.observables()
+        built.update((f"pose/{name}", pose) for name, pose in own.items())
+        built.update((f"pose/{name}", pose) for name, pose in poses.items() if name not in own)
+        built.update(self._images())
+        built.update(self._cloud_observables())
+        _enable(built, self._robot.observables.as_dict(fully_qualified=True), self._parts)
         return built
 
     def cloud(self, physics: mjcf.Physics) -> PointCloud:
         """All cameras' points as one cloud of fixed size; instance 0 is the surroundings."""
-        key = "cloud"
-        cached = self._cached(physics, key)
-        if cached is None:
-            model, data = physics.model.ptr, physics.data.ptr
-            clouds = []
-            for name in self._config.cameras:
-                image = self._image(physics, name)
-                intrinsics = camera_intrinsics(
-                    model, camera_id(model, name), self._config.height, self._config.width
-                )
-                clouds.append(
-                    cloud_from_depth(
-                        image.depth,
-                        self._segmentation(physics, name),
-                        intrinsics,
-                        camera_pose(model, data, name),
-                    )
-                )
-            cached = fuse(clouds).resized(self._config.cloud_size)
-            self._images[key] = (physics.data.time, cached)
-        return cached
-
-    def _image(self, physics: mjcf.Physics, camera: str) -> RayImage:
-        cached = self._cached(physics, camera)
-        if cached is None:
-            cached = self._camera.render(physics.model.ptr, physics.data.ptr, camera)
-            self._images[camera] = (physics.data.time, cached)
-        return cached
-
-    def _segmentation(self, physics: mjcf.Physics, camera: str) -> np.ndarray:
-        owners = geom_instances(physics.model.ptr, self._bodies(physics))
-        # The task's names start with the background.
-        return pixel_instances(self._image(physics, camera).geom_id, owners) + 1
-
-    def _bodies(self, physics: mjcf.Physics) -> list[int]:
-        frames = [mjcf.get_attachment_frame(e.mjcf_model) for e in self._entities]
-        return [int(physics.bind(frame).element_id) for frame in frames]
+        return self._clouds.fused(physics)
 
     def forget(self) -> None:
-        """Drop what was rendered; time alone cannot tell one episode's start from the next's."""
-        self._images.clear()
+        """An episode begins, or the state was changed from outside."""
+        self._rig.forget(self._scene.noise_seed or 0)
+        self._poses.forget()
+        self._clouds.forget()
 
-    def _cached(self, physics: mjcf.Physics, key: str) -> Any:
-        time, value = self._images.get(key, (-1.0, None))
-        return value if time == physics.data.time else None
+    def close(self) -> None:
+        """Free what GL holds."""
+        self._rig.close()
+
+    def _begun(self) -> bool:
+        return self._scene.noise_seed is not None
+
+    def _images(self) -> dict[str, Declared]:
+        shown: dict[str, Declared] = {}
+
+        def show(name: str, spec: specs.Array, read: Read) -> None:
+            shown[name] = Declared(spec, read, self._begun)
+
+        rig, shape = self._rig, (self._config.height, self._config.width)
+        most = len(self._entities)
+        for camera in rig.names:
+            colours = bounded((*shape, 3), np.uint8, 0, 255)
+            show(f"rgb/{camera}", colours, lambda p, c=camera: rig.rgb(p, c))
+            depths = bounded(shape, np.float32, 0.0, np.inf)
+            show(f"depth/{camera}", depths, lambda p, c=camera: rig.frame(p, c).depth)
+            ids = bounded(shape, np.int32, 0, most)
+            show(f"segmentation/{camera}", ids, lambda p, c=camera: rig.frame(p, c).instance)
+            show(f"camera/{camera}/pose", unbounded((4, 4)), lambda p, c=camera: rig.pose(p, c))
+            show(
+                f"camera/{camera}/intrinsics",
+                unbounded((3, 3)),
+                lambda p, c=camera: rig.intrinsics(p, c).matrix,
+            )
+        for name in self._clouded():
+            ids = bounded((1,), np.int32, 0, most)
+            show(f"segmentation/ids/{name}", ids, lambda _, n=name: [self._instance_of(n)])
+        return shown
+
+    def _cloud_observables(self) -> dict[str, Declared]:
+        clouds = self._clouds.observables(
+            self._clouded(), len(self._entities) + 1, self._instance_of, self._begun
+        )
+        for name in self._clouded():
+            ids = bounded((1,), np.int32, 0, len(self._entities))
+            clouds[f"ids/{name}"] = Declared(
+                ids, lambda _, n=name: [self._instance_of(n)], self._begun
+            )
+        return {f"pointcloud/{name}": each for name, each in clouds.items()}
+
+    def _clouded(self) -> tuple[str, ...]:
+        """Names of what has a cloud of its own: objects, and the episode's furniture."""
+        return (*self._slots.objects, "furniture") if self._slots.furniture else self._slots.objects
+
+    def _instance_of(self, name: str) -> int:
+        """Which instance it is in this episode; 0 if the episode does not have it."""
+        if name == "furniture":
+            entity = next(iter(self._scene.furnishings), None)
+        else:
+            entity = self._scene.movable.get(name)
+        numbers = {each: number for number, each in enumerate(self._entities, start=1)}
+        return 0 if entity is None else numbers.get(entity, 0)
+
+
+def _enable(
+    observables: Mapping[str, observable.Observable],
+    state: Mapping[str, observable.Observable],
+    parts: Iterable[str],
+) -> None:
+    """Switch on those of the modes and keys named; `state` is what the mode of that name shows.
+
+    Raises:
+      InputError: A key is unknown; the nearest are offered.
+    """
+    modes = set(parts)
+    for part in parts:
+        if "/" in part and part not in observables and part not in state:
+            raise unknown_name("observation key", part, (*observables, *state))
+    for name, each in state.items():
+        each.enabled = "state" in modes or name in modes
+    for name, each in observables.items():
+        mode = name.split("/")[0]
+        images = mode == "camera" and not modes.isdisjoint(_IMAGES)
+        each.enabled = mode in modes or name in modes or images

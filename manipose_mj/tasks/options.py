@@ -52,7 +52,9 @@ class TaskConfig:
     Attributes:
       tolerance: What counts as success.
       horizon: Time limit of an episode [s].
+      settle: Time that things have to come to rest before an episode starts [s].
     """
 
     tolerance: Tolerance = Tolerance()
     horizon: float = 60.0
+    settle: float = 0.3

@@ -46,6 +46,15 @@ _MODEL_FIELDS = (
     "cam_fovy",
 )
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_ASLEEP = (
+    "tree_asleep",
+    "tree_awake",
+    "body_awake",
+    "body_awake_ind",
+    "parent_awake_ind",
+    "dof_awake_ind",
+)
+_AWAKE_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
 # What the second half of the last step computed, which observations show; and the servos' speeds, which
 # dm_control leaves at zero when it resets.
 _LEFT_BEHIND = ("actuator_velocity", "actuator_force", "qacc", "sensordata")
@@ -58,6 +67,8 @@ class Snapshot:
     Attributes:
       state: MuJoCo's integration state.
       model: Fields of the model that an episode may change.
+      asleep: Which bodies are asleep, and how long the others have rested.
+      awake: How many are not.
       left_behind: What the last step computed on its way.
       memory: What the control mode remembers.
       task: What the task remembers of this episode.
@@ -67,6 +78,8 @@ class Snapshot:
 
     state: Float[np.ndarray, "n"]
     model: dict[str, np.ndarray]
+    asleep: dict[str, np.ndarray]
+    awake: dict[str, int]
     left_behind: dict[str, np.ndarray]
     memory: Float[np.ndarray, "m"]
     task: dict[str, Any]
@@ -86,6 +99,8 @@ def save(environment: composer.Environment) -> Snapshot:
     return Snapshot(
         state=state,
         model={name: np.array(getattr(model, name)) for name in _MODEL_FIELDS},
+        asleep={name: np.array(getattr(data, name)) for name in _ASLEEP},
+        awake={name: int(getattr(data, name)) for name in _AWAKE_COUNTS},
         left_behind={name: np.array(getattr(data, name)) for name in _LEFT_BEHIND},
         memory=task.options.action_mode.memory(),
         task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
@@ -115,6 +130,14 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
         )
     for name, values in snapshot.model.items():
         getattr(model, name)[:] = values
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_setState(model, data, snapshot.state, _STATE)
+    # Who sleeps is no part of MuJoCo's state: bodies that do are not moved, so all are put in place first.
+    mujoco.mj_forward(model, data)
+    for name, values in snapshot.asleep.items():
+        getattr(data, name)[:] = values
+    for name, count in snapshot.awake.items():
+        setattr(data, name, count)
     mujoco.mj_setState(model, data, snapshot.state, _STATE)
     # The first half of a step: what dm_control leaves behind after each.
     mujoco.mj_step1(model, data)

@@ -1,82 +1,90 @@
-"""`articulated/store_chips_can_middle_drawer`: the paper's headline experiment."""
+"""`articulated/store_*`: open a drawer or door, put an object behind it, shut it.
+
+`store_chips_can_middle_drawer` is the paper's headline experiment.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import radians
 
 import numpy as np
 from dm_control import mjcf
 from dm_control.composer.observation import observable
 from jaxtyping import Float
 
-from asset_pipeline.assets import Asset
-from manipose_mj.errors import InputError
+from asset_pipeline.assets import Asset, MovingPart
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.poses import rotation_about
 from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.tasks.contents import Contents, starts
+from manipose_mj.tasks.furniture import FurniturePool, Standing, side
 from manipose_mj.tasks.goals import Goal, InsideGoal, ShutGoal
+from manipose_mj.tasks.object_pool import ObjectPool
 from manipose_mj.tasks.options import TaskConfig, TaskOptions
+from manipose_mj.tasks.part_choice import PartChoice
+from manipose_mj.tasks.posed_things import Carried
 from manipose_mj.tasks.target_pose import pose_on_table
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
 class StoreConfig(TaskConfig):
-    """Attributes: part: which drawer or door to store behind; furniture_x, furniture_y: where the
-    handle of that part starts, in the world [m]; furniture_yaw: largest turn either way [rad];
-    x_range, y_range: where the object's label origin may start [m]."""
+    """Attributes: standing: where the furniture stands; x_range, y_range: where the object's label
+    origin may start [m], y mirrored for doors hinged on the right; max_fillers: how many other
+    objects may lie in the cavity already; shut: by which fraction of its range a door must be shut
+    in the end; None: to within the tolerance, as a drawer."""
 
     horizon: float = 90.0
-    part: str = "middle_drawer"
-    furniture_x: tuple[float, float] = (0.73, 0.77)
-    furniture_y: tuple[float, float] = (0.05, 0.15)
-    furniture_yaw: float = radians(6)
+    standing: Standing = Standing()
     x_range: tuple[float, float] = (0.32, 0.48)
     y_range: tuple[float, float] = (-0.42, -0.28)
+    max_fillers: int = 0
+    shut: float | None = None
 
 
 class Store(ManipulationTask):
-    """Open the drawer, lay the object inside, let go, shut the drawer.
+    """Open the part, put the object inside, let go, shut the part.
 
-    Success: the whole object is in the drawer's cavity, at rest and released, and
-    the drawer is shut to within 1 cm.
+    Success: the whole object is in the part's cavity, at rest and released, and the part is shut.
     """
 
     def __init__(
         self,
-        asset: Asset,
-        furniture: Asset,
+        objects: Sequence[Asset],
+        furniture: Sequence[Asset],
+        choice: PartChoice,
         config: StoreConfig | None = None,
         options: TaskOptions | None = None,
     ) -> None:
+        """Raises InputError where an object fits no cavity, or a part has none."""
         self.task_config = config or StoreConfig()
         super().__init__(self.task_config, options or TaskOptions())
-        self.part = furniture.part(self.task_config.part)
-        if self.part.cavity is None or self.part.handle is None:
-            raise InputError(
-                f"{furniture.folder}: part {self.part.name!r} has no cavity or no handle; "
-                "a store task needs both"
-            )
-        self.furniture = ArticulatedObject(furniture, name="cabinet")
-        self.object = RigidObject(asset, name="object")
-        self._arena.attach(self.furniture)
-        self._arena.add_free_entity(self.object)
-        self._instances.update(cabinet=self.furniture, object=self.object)
-        poses: dict[str, observable.Observable] = {
-            "object": observable.Generic(self.object.label_pose),
-            "cavity": observable.Generic(self.cavity_pose),
-        }
-        for part in furniture.parts:
-            if part.handle is not None:
-                poses[f"handle_{part.name}"] = observable.Generic(
-                    lambda physics, name=part.name: self.furniture.handle_pose(physics, name)
-                )
-            poses[f"opening_{part.name}"] = observable.Generic(
-                lambda physics, name=part.name: np.array([self.furniture.opening(physics, name)])
-            )
-        self._finish_build(poses)
+        self._furniture = FurniturePool(
+            furniture, choice, self.task_config.standing, self._arena, hollow=True
+        )
+        self._pool = ObjectPool(objects, self._arena)
+        self._contents = Contents(self._pool, self._furniture, taken=False)
+        for entity in (*self._furniture.entities, *self._pool.entities):
+            self._instances[entity.mjcf_model.model] = entity
+        self._active = self._piece = 0
+        self._fillers: tuple[int, ...] = ()
+        self._finish_build(
+            {"opening": observable.Generic(lambda p: self._furniture.opening(p, self._piece))}
+        )
+
+    @property
+    def object(self) -> RigidObject:
+        """The object of this episode."""
+        return self._pool.entities[self._active]
+
+    @property
+    def furniture(self) -> ArticulatedObject:
+        """The piece of furniture of this episode."""
+        return self._furniture.entities[self._piece]
+
+    @property
+    def part(self) -> MovingPart:
+        """Where the object goes."""
+        return self._furniture.parts[self._piece]
 
     @property
     def object_name(self) -> str:
@@ -84,11 +92,22 @@ class Store(ManipulationTask):
 
     @property
     def goals(self) -> tuple[Goal, ...]:
-        return (InsideGoal("object", self.part.name), ShutGoal(self.part.name))
+        name = self.part.name
+        return (InsideGoal("object", name), ShutGoal(name, self.task_config.shut))
+
+    @property
+    def landmarks(self) -> Mapping[str, Carried]:
+        return self._furniture.landmarks(self._piece)
+
+    @property
+    def object_slots(self) -> tuple[str, ...]:
+        fillers = range(self.task_config.max_fillers)
+        return ("object", *(f"filler_{k}" for k in fillers))
 
     @property
     def movable(self) -> dict[str, RigidObject]:
-        return {"object": self.object}
+        others = {f"filler_{k}": self._pool.entities[i] for k, i in enumerate(self._fillers)}
+        return {"object": self.object, **others}
 
     @property
     def furnishings(self) -> tuple[ArticulatedObject, ...]:
@@ -96,25 +115,32 @@ class Store(ManipulationTask):
 
     def cavity_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
         """`T_world_cavity` of the part that this task stores behind."""
-        return self.furniture.cavity_pose(physics, self.part.name)
+        return self._furniture.cavity_pose(physics, self._piece)
 
     def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         config = self.task_config
-        assert self.part.handle is not None
-        yaw = random_state.uniform(-config.furniture_yaw, config.furniture_yaw)
-        turn = rotation_about(UP, yaw)
-        handle_xy = (turn @ self.part.handle.origin)[:2]
-        place = np.array(
-            [random_state.uniform(*config.furniture_x), random_state.uniform(*config.furniture_y)]
-        )
-        frame = physics.bind(mjcf.get_attachment_frame(self.furniture.mjcf_model))
-        frame.pos = [*(place - handle_xy), 0.0]
-        frame.quat = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
-        for part in self.furniture.asset.parts:
-            physics.bind(self.furniture.joint(part.name)).qpos = part.joint.range[0]
-        start = random_state.randint(len(self.object.asset.stable_poses))
+        self._piece = _draw(random_state, len(self._furniture.entities))
+        self._active = self._contents.draw(random_state, self._piece)
+        self._furniture.place(physics, random_state, self._piece)
+        asset = self.object.asset
+        possible = starts(asset)
+        start = possible[random_state.randint(len(possible))]
         xy = np.array(
             [random_state.uniform(*config.x_range), random_state.uniform(*config.y_range)]
         )
-        pose = pose_on_table(self.object.asset, start, xy, random_state.uniform(-np.pi, np.pi))
+        xy[1] *= side(self.part)
+        pose = pose_on_table(asset, start, xy, random_state.uniform(-np.pi, np.pi))
+        count = _draw(random_state, config.max_fillers + 1)
+        fillers = self._contents.beside(random_state, self._piece, self._active, count)
+        self._fillers = tuple(fillers)
+        self._pool.use(physics, (self._active, *fillers))
         self.object.place(physics, pose)
+        physics.forward()
+        cavity = self.cavity_pose(physics)
+        for index, pose_cavity in fillers.items():
+            self._pool.entities[index].place(physics, cavity @ pose_cavity)
+
+
+def _draw(random_state: np.random.RandomState, count: int) -> int:
+    """One of `count`; no random number is spent where there is no choice."""
+    return int(random_state.randint(count)) if count > 1 else 0

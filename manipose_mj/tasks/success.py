@@ -70,6 +70,9 @@ def inside_cavity(
 ) -> Bool[Array, "*b"]:
     """Whether the object's bounding box, or cylinder if it is axial, lies in the cavity.
 
+    Below only the label's origin counts: nothing rests under a floor, and a corner of the box of
+    what lies askew may, a mug's on its handle by 4 cm.
+
     Args:
       label_pose_cavity: `T_cavity_label`; the cavity's frame is centred in it.
       label_extents: Of the object's bounding box along the label's axes [m].
@@ -88,4 +91,7 @@ def inside_cavity(
     else:
         reach = rotation @ half
     limit = xp.asarray(cavity_extents, dtype=dtype) / 2 + slack
-    return xp.all(xp.abs(label_pose_cavity[..., :3, 3]) + reach <= limit, axis=-1)
+    place = label_pose_cavity[..., :3, 3]
+    above_floor = place[..., 2] >= -limit[..., 2]
+    sideways = xp.all(xp.abs(place[..., :2]) + reach[..., :2] <= limit[..., :2], axis=-1)
+    return sideways & above_floor & (place[..., 2] + reach[..., 2] <= limit[..., 2])

@@ -19,7 +19,7 @@ TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer
 def make_runner(seconds: float = 0.0, diary: Path | None = None):
     """A runner whose outcome follows from the seed alone; local, so that it pickles by value."""
 
-    def run(task, *, episode, seed, pose, assets, object_name):
+    def run(task, *, episode, seed, pose, assets, object_name, split):
         start = time.perf_counter()
         rng = np.random.default_rng(seed)
         time.sleep(seconds * rng.uniform(0.5, 1.5))
@@ -53,7 +53,7 @@ def make_runner(seconds: float = 0.0, diary: Path | None = None):
     return run
 
 
-def scene(task, *, seed, assets, object_name) -> mujoco.MjModel:
+def scene(task, *, seed, assets, object_name, split="train") -> mujoco.MjModel:
     """A scene that fits the fake runner's trajectories: a pendulum of two links."""
     return mujoco.MjModel.from_xml_string("""
     <mujoco>

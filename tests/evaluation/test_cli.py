@@ -21,6 +21,7 @@ COMMANDS = (
     "evaluate",
     "list",
     "render",
+    "view",
     "doctor",
     "assets",
     "assets build",
@@ -112,7 +113,19 @@ def test_bad_flags_exit_with_2(argv: str, capsys) -> None:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ("evaluate single_object/target_pse", "did you mean single_object/target_pose?"),
+        ("evaluate single_object/target_pse", "did you mean single_object/target_pose"),
+        (
+            "evaluate single_object/target_pose --protocol v0",
+            "unknown protocol 'v0'; did you mean v1",
+        ),
+        (
+            "evaluate single_object/target_pse --protocol v1",
+            "did you mean single_object/target_pose",
+        ),
+        ("evaluate single_object/target_pose --protocol v1 --seed 2", "leave out seed"),
+        ("evaluate single_object/target_pose --protocol v1 --episodes 101", "has 100 episodes"),
+        ("view single_object/target_pse", "did you mean"),
+        ("view single_object/target_pose", "a window needs a display"),
         ("evaluate", "`manipose list` names them"),
         ("evaluate single_object/target_pose --resume", "--resume needs --out"),
         ("evaluate single_object/target_pose --episodes 0", "episodes is 0; expected at least 1"),

@@ -207,7 +207,7 @@ def pose_in_tcp(panda, physics):
 
 
 @pytest.mark.parametrize(
-    ("shape", "size"), [("cylinder", (0.035, 0.06)), ("box", (0.025, 0.025, 0.025))]
+    ("shape", "size"), [("cylinder", (0.035, 0.03)), ("box", (0.025, 0.025, 0.025))]
 )
 def test_a_held_object_is_squeezed_with_70_newtons_and_does_not_slip(shape, size):
     panda, physics = make_scene(shape=shape, size=size, at=(0.45, 0.0, 0.30))

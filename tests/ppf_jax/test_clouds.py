@@ -11,12 +11,12 @@ from scipy.ndimage import binary_erosion
 from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE
 from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.depth_normals import depth_normals
 from manipose_mj.mjcf.ray_camera import Intrinsics, image_rays
 from manipose_mj.mjcf.ray_casting import cast_rays
 from manipose_mj.poses import SymmetryGroup, compose, invert, quaternion_to_rotation, transform
 from manipose_mj.ppf_jax import view_cache
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, LabelledCloud, batch_clouds
-from manipose_mj.ppf_jax.depth_normals import depth_normals
 from manipose_mj.ppf_jax.occlusion import Occluder
 from manipose_mj.ppf_jax.rasteriser import Triangles, rasterise
 from manipose_mj.ppf_jax.rendering import Subject, render_clouds, render_view

@@ -12,11 +12,14 @@ import manipose_mj
 from asset_pipeline import catalogue
 from manipose_mj import suite
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.panda import HOME, MAX_OPENING
+from manipose_mj.mjcf.objects import RigidObject
+from manipose_mj.mjcf.panda import HOME, MAX_OPENING, VELOCITY_LIMITS
 from manipose_mj.mjcf.ray_camera import RayCamera, camera_intrinsics, camera_pose
 from manipose_mj.poses import compose, invert, rotation_about, transform
 from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.tasks.clutter import Clutter
 from manipose_mj.tasks.observations import SensorConfig
+from manipose_mj.tasks.take_out import TakeOut
 
 EVERYTHING = "state+pose+depth+segmentation+pointcloud"
 SENSORS = SensorConfig(height=60, width=80, cloud_size=4096)
@@ -94,7 +97,8 @@ def test_every_mode_has_its_shapes_and_types(environment):
     assert observation["pointcloud/points"].shape == (cloud, 3)
     assert observation["pointcloud/normals"].shape == (cloud, 3)
     assert observation["pointcloud/instance"].shape == (cloud,)
-    assert observation["pose/object"].shape == (4, 4)
+    for name in environment.task.movable:
+        assert observation[f"pose/{name}"].shape == (4, 4)
     assert observation["panda/joint_positions"].shape == (7,)
     assert observation["panda/tcp_pose"].shape == (7,)
 
@@ -102,7 +106,8 @@ def test_every_mode_has_its_shapes_and_types(environment):
 @pytest.mark.parametrize("mode", ["state", "pose", "depth", "segmentation", "pointcloud"])
 def test_only_the_modes_asked_for_are_shown(mode):
     observation = suite.load(*STORE, seed=0, observations=mode, sensors=SENSORS).reset().observation
-    assert {name.split("/")[0] for name in observation} == {"panda" if mode == "state" else mode}
+    found = {name.split("/")[0] for name in observation} - {"camera"}  # images bring their cameras
+    assert found == {"panda" if mode == "state" else mode}
 
 
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
@@ -136,9 +141,10 @@ def test_an_episode_does_not_depend_on_the_one_before(blind):
 def test_other_seeds_give_other_episodes(blind):
     starts = []
     for seed in range(4):
-        task = _reset(blind, seed)
-        starts.append(task.movable["object"].label_pose(blind.physics))
-    assert len({tuple(np.round(s.ravel(), 6)) for s in starts}) == 4
+        _reset(blind, seed)
+        # Objects move freely; furniture stands elsewhere in the model.
+        starts.append([*blind.physics.data.qpos, *blind.physics.model.body_pos.ravel()])
+    assert len({tuple(np.round(start, 6)) for start in starts}) == 4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -149,8 +155,7 @@ def test_random_actions_neither_break_the_physics_nor_push_things_through(blind,
         step = blind.step(rng.uniform(spec.minimum, spec.maximum))
         assert not step.last()
         assert np.isfinite(blind.physics.data.qpos).all()
-    # What is knocked off the table meets the floor at 4 m/s, 8 mm a physics step: 20 mm deep.
-    assert blind.task.max_penetration < 0.03
+    assert blind.task.max_penetration < 0.005
 
 
 def test_slow_random_motions_touch_without_sinking_in(blind):
@@ -163,15 +168,17 @@ def test_slow_random_motions_touch_without_sinking_in(blind):
 @pytest.mark.parametrize("seed", range(8))
 def test_an_episode_starts_at_rest_with_nothing_overlapping(blind, seed):
     task = _reset(blind, seed)
-    linear, angular = task.movable["object"].speeds(blind.physics)
-    assert linear < 0.01 and angular < 0.1
+    for thing in task.movable.values():
+        linear, angular = thing.speeds(blind.physics)
+        assert linear < 0.01 and angular < 0.1
     joints, opening = task.robot.configuration(blind.physics)
     np.testing.assert_allclose(joints, HOME, atol=2e-3)
     assert opening == pytest.approx(MAX_OPENING, abs=1e-3)
-    assert blind.physics.data.contact.dist.min() > -0.001
+    assert blind.physics.data.contact.dist.min(initial=0.0) > -0.001
     assert not task.succeeded(blind.physics)
     assert not task.success_once
-    assert not task.touches_robot(blind.physics, task.movable["object"])
+    for thing in task.movable.values():
+        assert not task.touches_robot(blind.physics, thing)
     blind.step(HOLD)
     assert task.max_penetration < 0.001
 
@@ -231,7 +238,7 @@ def test_the_goal_marker_is_neither_seen_nor_touched():
 def test_the_objects_points_lie_on_the_object(environment, seed):
     task = _reset(environment, seed)
     step = environment.step(HOLD)
-    thing = task.movable["object"]
+    thing = _in_sight(task, environment.physics)
     own = task.instance_names.index(thing.mjcf_model.model)
     cloud = step.observation["pointcloud/points"][step.observation["pointcloud/instance"] == own]
     assert len(cloud) > 20
@@ -241,6 +248,17 @@ def test_the_objects_points_lie_on_the_object(environment, seed):
     assert ((np.abs(lengths - 1) < 1e-3) | (lengths == 0)).all()
     spread = cloud.max(axis=0) - cloud.min(axis=0)
     assert spread.max() > 0.4 * thing.asset.label.extents.max()
+
+
+def _in_sight(task: ManipulationTask, physics: mjcf.Physics) -> RigidObject:
+    """The object that an episode is about, where cameras can see it at the start."""
+    thing = task.movable.get("object")
+    if thing is None or isinstance(task, TakeOut):
+        pytest.skip("nothing lies in sight: there is furniture only, or the object is in it")
+    if isinstance(task, Clutter):  # something large and high up
+        height = {e: e.label_pose(physics)[2, 3] for e in task.movable.values()}
+        return max(height, key=lambda e: height[e] * e.asset.label.extents.prod())
+    return thing
 
 
 def _assert_on(thing, physics, points_world: np.ndarray) -> None:
@@ -253,7 +271,7 @@ def test_depth_and_segmentation_are_of_the_same_picture(environment):
     task = _reset(environment, 6)
     environment.step(HOLD)
     observation = environment.step(HOLD).observation
-    physics, thing = environment.physics, task.movable["object"]
+    physics, thing = environment.physics, _in_sight(task, environment.physics)
     own = task.instance_names.index(thing.mjcf_model.model)
     model, data = physics.model.ptr, physics.data.ptr
     found = 0
@@ -399,7 +417,13 @@ def test_wrong_actions_are_refused(blind, action):
 
 def test_actions_beyond_the_limits_are_clipped(blind):
     task = _reset(blind, 0)
+    servos = blind.physics.bind(task.robot.actuators)
+    before = np.array(servos.ctrl)
     blind.step(np.full(8, 100.0))
+    most = VELOCITY_LIMITS * blind.control_timestep()
+    np.testing.assert_allclose(servos.ctrl - before, most, rtol=1e-9)  # as fast as a Panda may move
+    for _ in range(80):
+        blind.step(np.full(8, 100.0))
     limits = blind.action_spec().maximum
     np.testing.assert_allclose(blind.physics.bind(task.robot.actuators).ctrl, limits[:7])
 

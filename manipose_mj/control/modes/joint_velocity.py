@@ -2,7 +2,8 @@
 
 ManiSkill 3's drives (`controllers/pd_joint_vel.py`, `pd_joint_pos_vel.py`) push with
 `k (q* - q) + d (v* - v)`, and set k to zero for `pd_joint_vel`. A mode here changes no gain: a servo
-that is sent `q* + (d / k) v*` pushes exactly as hard as a drive with both targets.
+that is sent `q* + (d / k) v*` pushes exactly as hard as a drive with both targets, once it has got
+there: in every mode what servos are sent moves no faster than the joints can.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class JointPositionVelocity(ArmMode):
     def begin(self, physics: mjcf.Physics, robot: Panda, action: Float[np.ndarray, "n"]) -> None:
         """Take the action of this control step."""
         super().begin(physics, robot, action)
-        velocity = MAX_SPEED * np.clip(action[-8:-1], self.lower[-7:], self.upper[-7:])
+        velocity = np.clip(action[-8:-1], self.lower[-7:], self.upper[-7:])
         self._lead = servo_lag(physics, robot) * velocity
 
     def arm_targets(

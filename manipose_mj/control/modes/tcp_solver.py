@@ -19,13 +19,15 @@ _LOW, _HIGH = POSITION_LIMITS.T
 @dataclass(frozen=True)
 class TcpSolverConfig:
     """Attributes: iterations: at most; damping: added to the squared error [m^2]; lever: metres that
-    a radian of tilt counts; tolerance: error that ends the search [m]; max_step: of a joint in one
+    a radian of tilt counts; tolerance: error that ends the search [m]; least_gain: the share of the
+    squared error that may be left by an iteration that is worth another; max_step: of a joint in one
     iteration [rad]."""
 
-    iterations: int = 40
+    iterations: int = 25
     damping: float = 1e-5
     lever: float = 0.3
     tolerance: float = 1e-7
+    least_gain: float = 0.999
     max_step: float = 0.3
 
 
@@ -38,6 +40,10 @@ class TcpSolver:
         self._data = mujoco.MjData(self._model)
         self._site = self._model.site("tcp").id
         self._jacobian = np.zeros((6, self._model.nv))
+
+    def __reduce__(self) -> tuple[type[TcpSolver], tuple[TcpSolverConfig]]:
+        # Solvers remember nothing: what is copied or sent to another process is the configuration.
+        return TcpSolver, (self._config,)
 
     def pose(self, joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
         """`T_base_tcp` of a configuration [rad]."""
@@ -66,18 +72,23 @@ class TcpSolver:
         config = self._config
         goal = np.empty(4)
         mujoco.mju_mat2Quat(goal, pose[:3, :3].ravel())
-        joints = np.clip(start, _LOW, _HIGH)
-        best, least = joints, np.inf
+        best = np.clip(start, _LOW, _HIGH)
+        error = self._error(pose[:3, 3], goal, best)
+        least, caution = float(error @ error), 1.0
         for _ in range(config.iterations):
-            error = self._error(pose[:3, 3], goal, joints)
-            squared = float(error @ error)
-            # Where nothing is gained any more the pose is out of reach.
-            if squared > 0.999 * least:
+            if least < config.tolerance**2:
                 break
-            best, least = joints, squared
-            if squared < config.tolerance**2:
+            joints = self._stepped(best, error, caution * (0.5 * least + config.damping))
+            new = self._error(pose[:3, 3], goal, joints)
+            squared = float(new @ new)
+            if squared >= least:
+                caution *= 10.0
+                continue
+            # Where little is gained any more the pose is out of reach.
+            done = squared > config.least_gain * least
+            best, error, least, caution = joints, new, squared, max(1.0, caution / 10.0)
+            if done:
                 break
-            joints = self._stepped(joints, error, 0.5 * squared + config.damping)
         return best, float(np.sqrt(least))
 
     def _place(self, joints: Float[np.ndarray, "7"]) -> None:
@@ -102,8 +113,9 @@ class TcpSolver:
     def _stepped(
         self, joints: Float[np.ndarray, "7"], error: Float[np.ndarray, "6"], damping: float
     ) -> Float[np.ndarray, "7"]:
-        """One damped step from where the data is; joints that would cross a limit stay at it."""
+        """One damped step; joints that would cross a limit stay, and the others make up for it."""
         config, jacobian = self._config, self._jacobian
+        self._place(joints)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_jacSite(self._model, self._data, jacobian[:3], jacobian[3:], self._site)
         jacobian[3:] *= config.lever

@@ -1,0 +1,78 @@
+"""The example in docs/own_tasks.md works as it stands, at every front door."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from dm_control import suite as dm_suite
+from own_tasks import diverging, forget, registered
+
+import manipose_mj
+from manipose_mj import suite
+from manipose_mj.gym import env_id
+from manipose_mj.tasks.registry import task_spec
+
+PAGE = Path(__file__).parents[2] / "docs" / "own_tasks.md"
+
+
+@pytest.fixture
+def lift_mug(tmp_path):
+    """The page's module, imported."""
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "lift_mug_example.py").write_text(code, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location(
+        "lift_mug_example", tmp_path / "lift_mug_example.py"
+    )
+    module = importlib.util.module_from_spec(spec)
+    manipose_mj.register_suite()  # before: tasks of later show up too
+    spec.loader.exec_module(module)
+    yield "example", "lift_mug"
+    forget("example", "lift_mug")
+
+
+def test_every_front_door_knows_a_task_of_ones_own(lift_mug):
+    assert lift_mug in suite.ALL_TASKS and lift_mug in dm_suite.ALL_TASKS
+    assert suite.describe(*lift_mug) == "Lift a mug 20 cm off the table."
+    assert task_spec(*lift_mug).description.startswith("The first line is")
+    assert dm_suite.TASKS_BY_DOMAIN["example"] == ("lift_mug",)
+    starts = [
+        suite.load(*lift_mug, seed=3).reset().observation,
+        dm_suite.load(*lift_mug, task_kwargs={"random": 3}).reset().observation,
+        gymnasium.make("manipose_mj/LiftMug-v0").reset(seed=3)[0],
+    ]
+    for other in starts[1:]:
+        assert other.keys() == starts[0].keys()
+        assert all(np.array_equal(other[name], value) for name, value in starts[0].items())
+
+
+def test_the_example_rewards_lifting(lift_mug):
+    environment = suite.load(*lift_mug, seed=0, reward="dense", control_mode="pd_ee_delta_pose")
+    environment.reset()
+    task, physics = environment.task, environment.physics
+    hold = np.append(np.zeros(6), 0.08)
+    low = environment.step(hold).reward
+    pose = task.object.object_pose(physics)
+    pose[2, 3] += 0.1
+    task.object.place(physics, pose)
+    middle = environment.step(hold).reward
+    pose[2, 3] += 0.1
+    task.object.place(physics, pose)
+    assert 0 < low < middle < environment.step(hold).reward == 1.0
+
+
+def test_a_name_is_taken_once(lift_mug):
+    with pytest.raises(ValueError, match="example/lift_mug is registered already"):
+        manipose_mj.register_task(*lift_mug)(diverging)
+    # Two tasks of one name in different families would share a Gymnasium id.
+    taken = env_id("target_pose")
+    with (
+        pytest.raises(ValueError, match=f"{taken}.*choose another name"),
+        registered("target_pose", diverging),
+    ):
+        pass
+    assert ("example", "target_pose") not in suite.ALL_TASKS
