@@ -114,15 +114,19 @@ class MotionPlanner:
         goal: Float[np.ndarray, "7"],
         *,
         carried: Carried | None = None,
+        tight: bool = False,
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
-        Keeps as far from everything as the start allows; the goal must have room around it.
+        Keeps as far from everything as the start allows; the goal must have room around it, unless it may
+        be `tight`.
         """
-        if self.collides(goal, clearance=TRANSIT, carried=carried):
+        if self.collides(goal, clearance=GRAZING if tight else TRANSIT, carried=carried):
             return None
         for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
             if self.collides(start, clearance=wide, carried=carried):
+                continue
+            if tight and self.collides(goal, clearance=wide, carried=carried):
                 continue
             with self.scene.query(clearance=wide, carried=carried) as scene:
                 path = plan_path(start, goal, scene.in_collision, self._rng)

@@ -81,15 +81,17 @@ def grip_handle(
         and _can_get_off(planner, part, way)
     ]
     ways.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
-    for way in ways[:_MAX_TRIES]:
-        wide = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
-        planner.scene.set_opening(wide)
-        approach = _backwards(planner, part, way.joints[0], _STANDOFFS)
-        if approach is None:
-            continue
-        free_path = planner.free_path(belief.joints, approach[0])
-        if free_path is not None:
-            return HandleGrip(free_path, approach, wide, way.hold.opening)
+    # At low handles the wrist is within millimetres of the table: only if nothing else will do.
+    for tight in (False, True):
+        for way in ways[:_MAX_TRIES]:
+            wide = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
+            planner.scene.set_opening(wide)
+            approach = _backwards(planner, part, way.joints[0], _STANDOFFS)
+            if approach is None:
+                continue
+            free_path = planner.free_path(belief.joints, approach[0], tight=tight)
+            if free_path is not None:
+                return HandleGrip(free_path, approach, wide, way.hold.opening)
     raise StageFailure(
         "plan",
         f"no grip of {part.name}'s handle works: {len(ways)} could move it, none can be approached",

@@ -272,7 +272,7 @@ def test_clearance_is_how_near_is_too_near(scene):
 
 
 def _thing(environment, scene):
-    body = environment.physics.model.ptr.body("object/").id
+    body = environment.physics.model.ptr.body("object_0/").id
     return body, int(scene.model.body_jntadr[body])
 
 
@@ -286,7 +286,7 @@ def test_what_is_carried_collides_though_the_hand_is_free(environment, scene):
     with scene.query(clearance=TRANSIT, carried=carried):
         assert scene.in_collision(low)
         names = scene.first_collision(low)[:2]
-        assert any(name.startswith("object/") for name in names)
+        assert any(name.startswith("object_0/") for name in names)
         assert not scene.in_collision(high)
 
 
@@ -299,11 +299,11 @@ def test_a_target_may_be_touched_by_the_gripper_alone(environment, scene):
     scene.set_opening(0.08)
     with scene.query(clearance=TRANSIT) as strict:
         blocked = strict.first_collision(joints)
-    assert blocked is not None and any(n.startswith("object/") for n in blocked[:2])
+    assert blocked is not None and any(n.startswith("object_0/") for n in blocked[:2])
     lenient = CONTACT.__class__(arm=0.001, target=-np.inf, carried=0.0)
     with scene.query(clearance=lenient, target=geoms) as allowed:
         hit = allowed.first_collision(joints)
-    assert hit is None or not any(n.startswith("object/") for n in hit[:2])
+    assert hit is None or not any(n.startswith("object_0/") for n in hit[:2])
 
 
 def test_a_query_leaves_the_scene_as_it_was(environment, scene):

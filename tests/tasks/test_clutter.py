@@ -85,7 +85,8 @@ def test_targets_set_down_at_their_goals_stay_there_and_are_a_success(environmen
     for _ in range(100):
         step = environment.step(HOLD)
     assert step.reward == 1.0
-    assert task.goal_error(physics)[0] < 0.005
+    error = task.goal_error(physics)
+    assert error is not None and error[0] < 0.005
 
 
 def test_the_target_of_pick_has_nothing_on_it_and_a_free_grasp(environments):
@@ -100,7 +101,7 @@ def test_the_targets_of_multi_are_two_or_three_and_nothing_else_lies_on_them(env
     counts = set()
     for seed in SEEDS:
         _, task = _reset(environments, "multi", seed)
-        names = [goal.object for goal in task.goals]
+        names = [goal.object for goal in task.goals if isinstance(goal, PoseGoal)]
         counts.add(len(names))
         assert names == list(("object", "object_second", "object_third")[: len(names)])
         pile, _ = _pile_of(task)

@@ -9,11 +9,11 @@ from asset_pipeline import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.pile import Pile, settle
 from manipose_mj.tasks.pile_cache import PileCache
-from manipose_mj.tasks.pile_layout import PileConfig
+from manipose_mj.tasks.pile_layout import Layout, PileConfig
 from manipose_mj.tasks.pile_scene import PileScene
 
 NAMES = (("box", 10), ("box", 16), ("chips_can", 0), ("drinkbox", 1), ("remote", 0), ("sausage", 0))
-FEW = {"heap": (3, 6), "stack": (3, 6), "cover": (4, 6)}
+FEW: dict[Layout, tuple[int, int]] = {"heap": (3, 6), "stack": (3, 6), "cover": (4, 6)}
 
 
 @pytest.fixture(scope="module")
