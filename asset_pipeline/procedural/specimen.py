@@ -46,3 +46,11 @@ def drawn(rng: np.random.Generator, low: float, high: float) -> float:
 def in_turn(index: int, choices: tuple[_Choice, ...]) -> _Choice:
     """The colours of instance `index`, so that neighbours differ; instance 0 has its own."""
     return choices[(index - 1) % len(choices)]
+
+
+def mixed(index: int) -> int:
+    """A number to take turns by where the choices are five: every fifth instance is a test object.
+
+    Taken by the index, all test objects were of one style that no training object has.
+    """
+    return index + index // 5

@@ -16,7 +16,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 CONTENT = 430.0  # mean of wall, content and air [kg/m^3]
@@ -116,7 +116,7 @@ def design(index: int) -> Bottle:
     if index == 0:
         return Bottle()
     rng = specimen_rng("bottle", index)
-    kind = in_turn(index, _KINDS)
+    kind = in_turn(mixed(index), _KINDS)
     label, stripe, lid = in_turn(index, _LABELS)
     bottle = Bottle(
         cap=kind.cap,

@@ -15,7 +15,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.vessel import Glaze, disc, rings, upright_wall, vessel, wall_rings
 from manipose_mj.poses import SymmetryGroup
 
@@ -63,7 +63,7 @@ def design(index: int) -> Candle:
     if index == 0:
         return Candle()
     rng = specimen_rng("candle", index)
-    kind: Kind = in_turn(index, ("taper", "glass", "pillar", "votive", "pillar"))
+    kind: Kind = in_turn(mixed(index), ("taper", "glass", "pillar", "votive", "pillar"))
     wide, tall = {
         "pillar": ((0.045, 0.072), (1.25, 2.3)),
         "taper": ((0.0205, 0.024), (6.6, 8.0)),

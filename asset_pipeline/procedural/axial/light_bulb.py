@@ -14,7 +14,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through, revolved_mass
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 TURNS = 5  # of the screw's thread that show
@@ -63,7 +63,7 @@ def design(index: int) -> LightBulb:
     if index == 0:
         return LightBulb()
     rng = specimen_rng("light_bulb", index)
-    shape = in_turn(index, ("A", "C", "A", "G", "T"))
+    shape = in_turn(mixed(index), ("A", "C", "A", "G", "T"))
     small = shape == "C" or (shape == "T" and index % 2 == 0)
     led = shape in "AG" and index % 3 != 0
     return LightBulb(

@@ -14,7 +14,7 @@ import numpy as np
 from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass, wall_wedges
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
 from manipose_mj.poses import SymmetryGroup
 
 WOUND, CARDBOARD = 950.0, 700.0  # [kg/m^3]
@@ -86,7 +86,7 @@ def design(index: int) -> Tape:
     if index == 0:
         return Tape()
     rng = specimen_rng("tape", index)
-    kind = in_turn(index, _KINDS)
+    kind = in_turn(mixed(index), _KINDS)
     tape, cardboard = in_turn(index // len(_KINDS) + 1, kind.looks)
     return Tape(
         diameter=drawn(rng, *kind.diameter),

@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.tool import tool_specimen
 from manipose_mj.poses import SymmetryGroup
 
@@ -125,7 +125,7 @@ def design(index: int) -> Brush:
     if index == 0:
         return Brush()
     rng = specimen_rng("brush", index)
-    style = _STYLES[index % len(_STYLES)]
+    style = _STYLES[mixed(index) % len(_STYLES)]
     length, width, thick, ferrule, bristle = (
         round(float(rng.uniform(*r)), 4) for r in _SIZES[style]
     )

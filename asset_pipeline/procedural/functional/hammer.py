@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from asset_pipeline.procedural.handles import ROUND, handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
 from manipose_mj.poses import SymmetryGroup, compose
@@ -72,7 +72,7 @@ def design(index: int) -> Hammer:
     if index == 0:
         return Hammer()
     rng = specimen_rng("hammer", index)
-    style = _STYLES[index % 5]
+    style = _STYLES[mixed(index) % 5]
     grip: Grip = "wood" if style == "beech" or rng.uniform() < 0.5 else "sleeve"
     wood = in_turn(1 + index // 5, _WOODS)
     hold, shaft = (wood, wood) if grip == "wood" else in_turn(1 + index // 5, _SLEEVES)

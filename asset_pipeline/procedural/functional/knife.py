@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 
 from asset_pipeline.procedural.handles import handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
 from manipose_mj.poses import compose
@@ -116,7 +116,7 @@ def design(index: int) -> Knife:
     if index == 0:
         return Knife()
     rng = specimen_rng("knife", index)
-    style = _STYLES[index % 5]
+    style = _STYLES[mixed(index) % 5]
     kind = _KINDS[style]
     scales, density = in_turn(index, _SCALES)
     plain = style == "table"

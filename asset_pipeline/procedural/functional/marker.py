@@ -17,7 +17,7 @@ import numpy as np
 
 from asset_pipeline.procedural.handles import handle
 from asset_pipeline.procedural.pieces import Piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.tool import tool_specimen
 from manipose_mj.poses import SymmetryGroup
 
@@ -76,7 +76,7 @@ def design(index: int) -> Marker:
     if index == 0:
         return Marker()
     rng = specimen_rng("marker", index)
-    style = _STYLES[index % len(_STYLES)]
+    style = _STYLES[mixed(index) % len(_STYLES)]
     thick, barrel, holder, nib = (round(float(rng.uniform(*r)), 4) for r in _SIZES[style])
     turn = 1 + index // len(_STYLES)
     return Marker(

@@ -29,7 +29,7 @@ from asset_pipeline.procedural.cutlery import (
 )
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.sheet import sheet
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
 
@@ -84,7 +84,7 @@ def design(index: int) -> Spoon:
     if index == 0:
         return Spoon()
     rng = specimen_rng("spoon", index)
-    if index % 5 == 3:
+    if mixed(index) % 5 == 3:
         return _cooking_spoon(rng, in_turn(index // 5 + 1, _WOODS))
     whole, bowl, width, end, neck = (
         round(float(rng.uniform(*r)), 4) for r in _SIZES[index % len(_SIZES)]

@@ -17,7 +17,7 @@ from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.sheet import sheet
 from asset_pipeline.procedural.shell import offset_loops, painted, shell_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.turned import turned
 from manipose_mj.poses import SymmetryGroup, compose
 
@@ -82,7 +82,7 @@ def design(index: int) -> Hat:
     if index == 0:
         return Hat()
     rng = specimen_rng("hat", index)
-    style: Style = in_turn(index, _STYLES)
+    style: Style = in_turn(mixed(index), _STYLES)
     # Height, power, taper, pinch; front, side, back, droop and curve of the brim.
     low, high = {
         "cap": (

@@ -18,7 +18,7 @@ from asset_pipeline.procedural.mirror.airframe import fin, nacelle, propeller, w
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, loft, print_on_face, rounded_rectangle
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
 from manipose_mj.poses import SymmetryGroup, compose
 
@@ -106,7 +106,7 @@ def design(index: int) -> Airplane:
         thick=s[6],
         tail=s[7],
         fin=s[8],
-        blades=3 if index % 5 == 2 else 2,
+        blades=3 if mixed(index) % 5 == 2 else 2,
         density=round(float(rng.uniform(550.0, 900.0)), 0),
         colour=colour,
         wings=wings,

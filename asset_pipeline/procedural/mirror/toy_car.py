@@ -25,7 +25,7 @@ from asset_pipeline.procedural.solids import (
     rounded_box,
     rounded_rectangle,
 )
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
 from manipose_mj.poses import SymmetryGroup, compose
 
@@ -88,7 +88,7 @@ def design(index: int) -> Car:
     if index == 0:
         return Car()
     rng = specimen_rng("toy_car", index)
-    style: Style = in_turn(index, _STYLES)
+    style: Style = in_turn(mixed(index), _STYLES)
     length = float(np.exp(rng.uniform(np.log(0.072), np.log(0.185))))
     # Belt, roof, nose, boot as shares of the length; screen, front, rear, back; wheel.
     belt, roof, nose, boot, screen, front, rear, back, wheel = {
