@@ -58,7 +58,12 @@ def evaluate_pose(
     from manipose_mj.ppf_jax.metrics import most_confident, pose_errors, summary
     from manipose_mj.ppf_jax.view_settings import view_setting
 
-    estimator = PoseEstimator.load(name) if weights is None else PoseEstimator.from_file(weights)
+    if weights is None:
+        if labels == "original":
+            raise InputError("the package's weights are of unified labels; give --weights FILE")
+        estimator = PoseEstimator.load(name)
+    else:
+        estimator = PoseEstimator.from_file(weights, labels=labels)
     rows = []
     categories = (name,) if assets is not None else PoseClouds(name).categories
     for category in categories:
@@ -81,6 +86,7 @@ def evaluate_pose(
         rows.append(
             {
                 "category": category,
+                "method": estimator.trained.method,
                 "setting": setting,
                 "labels": labels,
                 **figures,
@@ -92,7 +98,7 @@ def evaluate_pose(
     if json:
         output.write_json(rows)
         return 0
-    table = Table("category", title=f"{setting}, {labels} labels")
+    table = Table("category", title=f"{estimator.trained.method}, {setting}, {labels} labels")
     heads = ("n", "cm", "median", "deg", "median", "flipped", "5 deg 2 cm", "10 deg 5 cm")
     for head in (*heads, f"deg of surest {KEPT:.0%}", "ms"):
         table.add_column(head, justify="right")

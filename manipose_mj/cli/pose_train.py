@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,7 +12,6 @@ from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
 WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
-CHECKS = 4  # batches of test objects for the curve; nothing is chosen by them
 Name = Annotated[Positional[str], arg(metavar="CATEGORY|TYPE")]
 
 
@@ -21,6 +21,7 @@ def train_pose(
     *,
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     leave_out: Annotated[tuple[str, ...], arg(metavar="CATEGORY...")] = (),
+    method: Literal["ours", "cppf"] = "ours",
     labels: Literal["unified", "original"] = "unified",
     setting: str = "training",
     views: int = 256,
@@ -38,8 +39,11 @@ def train_pose(
     Args:
       name: A category, such as mug; or a type, axial, mirror or functional: one network for all of
         its categories.
-      out: Folder to write to; pose/NAME, or pose/NAME-original, without it.
+      out: Folder to write to; without it pose/NAME, or pose/NAME-cppf, pose/NAME-original,
+        pose/NAME-cppf-original.
       leave_out: Categories of the type that are not trained on.
+      method: Our estimator, or CPPF as published, to compare with; for the latter --batch 8 is enough
+        on a CPU.
       labels: The unified labels, or those of the sources that the objects are assigned to.
       setting: From where objects are seen: training, anywhere, resting, tasks, clean, occluded.
       views: Of each object.
@@ -58,18 +62,19 @@ def train_pose(
     from manipose_mj.cli import output
     from manipose_mj.cli.pose_clouds import PoseClouds
     from manipose_mj.ppf_jax.curve_picture import draw_curve
-    from manipose_mj.ppf_jax.model import ModelConfig
-    from manipose_mj.ppf_jax.symmetry import common_symmetry
-    from manipose_mj.ppf_jax.training import CURVE_FILE, Row, TrainingConfig, train
+    from manipose_mj.ppf_jax.methods import METHODS
+    from manipose_mj.ppf_jax.training import CURVE_FILE, Row, train
     from manipose_mj.ppf_jax.view_cache import batch_stream
     from manipose_mj.ppf_jax.weights import TrainedModel, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
     clouds = source.rendered("train", setting, views)
-    held_out = source.rendered("test", setting, 1 + CHECKS * batch // source.objects("test"))
-    checks = batch_stream(held_out, batch, seed)(0)
-    suffix = "" if labels == "unified" else f"-{labels}"
-    folder = Path("pose") / f"{name}{suffix}" if out is None else out
+    chosen = METHODS[method]
+    # For the curve; nothing is chosen by them.
+    checks = -(-chosen.checks // batch)
+    held_out = source.rendered("test", setting, 1 + checks * batch // source.objects("test"))
+    stream = batch_stream(held_out, batch, seed, points=chosen.points)(0)
+    folder = Path("pose") / folder_name(name, method, labels) if out is None else out
     with output.Progress("steps") as progress:
 
         def show(row: Row) -> None:
@@ -77,18 +82,27 @@ def train_pose(
             progress.update(int(row["step"]) + 1, steps, f"loss {row['loss']:.3f}{error}")
 
         model = train(
-            batch_stream(clouds, batch, seed),
-            ModelConfig(symmetry=common_symmetry(cloud.symmetry for cloud in clouds)),
-            TrainingConfig(steps=steps, seed=seed),
+            batch_stream(clouds, batch, seed, points=chosen.points),
+            chosen.configured(clouds),
+            replace(chosen.training, steps=steps, seed=seed),
             folder,
-            held_out=[next(checks) for _ in range(CHECKS)],
+            build=chosen.build,
+            held_out=[next(stream) for _ in range(checks)],
             minutes=minutes,
             progress=show,
         )
-    save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories))
+    save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels))
     draw_curve(folder / CURVE_FILE, folder / CURVE_PICTURE)
     output.standard_output().print(
         f"trained on {len(clouds)} views of {', '.join(source.categories)}; {folder / WEIGHTS_FILE}",
         soft_wrap=True,
     )
     return 0
+
+
+def folder_name(name: str, method: str, labels: str) -> str:
+    """Where a training is kept if its user does not say."""
+    parts = [name]
+    parts += [method] if method != "ours" else []
+    parts += [labels] if labels != "unified" else []
+    return "-".join(parts)

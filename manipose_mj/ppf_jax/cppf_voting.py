@@ -32,6 +32,7 @@ class CppfConfig:
       reach: The largest `|mu|` and `nu` that bins can say [m].
       mean_log_extents: Of the category's objects, of lengths in m.
       symmetry: Which angles are folded; an axis of revolution has no right.
+      points: Of the sample that is looked at.
       neighbours: Of the point encoder.
       center_bins: For mu and nu each.
       angle_bins: For the angle to up and to right each.
@@ -48,6 +49,7 @@ class CppfConfig:
     reach: tuple[float, float]
     mean_log_extents: tuple[float, float, float]
     symmetry: CommonSymmetry = CommonSymmetry()
+    points: int = 512
     neighbours: int = 60
     center_bins: int = 32
     angle_bins: int = 36

@@ -21,7 +21,7 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, estimate_batch
-from manipose_mj.ppf_jax.weights import TrainedModel, load_weights
+from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load_weights
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
@@ -93,13 +93,31 @@ class PoseEstimator:
         )
 
     @classmethod
-    def from_file(cls, path: Path | str) -> PoseEstimator:
+    def from_file(
+        cls,
+        path: Path | str,
+        *,
+        method: MethodName | None = None,
+        labels: LabelSet | None = None,
+    ) -> PoseEstimator:
         """The estimator whose weights a training wrote.
 
+        Args:
+          path: Of the file.
+          method: What the weights have to be of, if that matters.
+          labels: What they have to be trained on, if that matters.
+
         Raises:
-          InputError: The file is missing, truncated or of another version.
+          InputError: The file is missing, truncated, of another version, or not what was asked for.
         """
-        return cls(load_weights(Path(path)))
+        trained = load_weights(Path(path))
+        if method is not None and trained.method != method:
+            raise InputError(f"{path}: weights of method {trained.method}; expected {method}")
+        if labels is not None and trained.labels != labels:
+            raise InputError(
+                f"{path}: weights trained on {trained.labels} labels; expected {labels}"
+            )
+        return cls(trained)
 
     def estimate(self, cloud: AnyCloud, *, key: PRNGKeyArray) -> PoseEstimate:
         """The pose of the object that a cloud shows.

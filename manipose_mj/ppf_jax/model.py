@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import equinox as eqx
 import jax
@@ -28,8 +28,6 @@ from manipose_mj.ppf_jax.refinement import (
 from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import Hypotheses, VotingConfig, agreement, vote
-
-AT_ONCE = 128  # clouds whose votes are in memory together
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,7 @@ class EstimatingModel(Protocol):
     """What turns clouds into poses: `PoseModel`, or a baseline. An `eqx.Module`."""
 
     config: Any  # a frozen dataclass
+    at_once: ClassVar[int]  # clouds whose votes are in memory together
 
     def estimate(
         self,
@@ -76,6 +75,7 @@ class PoseModel(eqx.Module):
     network: VotingNetwork
     refiner: Refiner
     config: ModelConfig = eqx.field(static=True)
+    at_once: ClassVar[int] = 128
 
     def __init__(self, config: ModelConfig, *, rng: np.random.Generator):
         self.network = VotingNetwork(config.network, rng=rng)
@@ -207,16 +207,16 @@ def estimate_batch(
     *,
     key: PRNGKeyArray,
 ) -> Estimates:
-    """The estimates for every row of a batch, `AT_ONCE` at a time to bound the memory."""
+    """The estimates for every row of a batch, `at_once` at a time to bound the memory."""
     keys = jax.random.split(key, len(points))
     rows = (jnp.asarray(points), jnp.asarray(normals), jnp.asarray(mask), keys)
 
     def one(row: tuple[Array, ...]) -> Estimates:
         return model.estimate(*row[:3], key=row[3])
 
-    if len(points) <= AT_ONCE:
+    if len(points) <= model.at_once:
         return jax.vmap(one)(rows)
-    return jax.lax.map(one, rows, batch_size=AT_ONCE)
+    return jax.lax.map(one, rows, batch_size=model.at_once)
 
 
 def refine(model: PoseModel, seen: Evidence, hypotheses: Hypotheses, steps: int) -> Hypotheses:

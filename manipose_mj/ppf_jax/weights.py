@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +28,8 @@ from manipose_mj.ppf_jax.voting import VotingConfig
 
 FORMAT_VERSION = 1
 _HEADER = "header"
+MethodName: TypeAlias = Literal["ours", "cppf"]
+LabelSet: TypeAlias = Literal["unified", "original"]
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,17 @@ class TrainedModel:
     Attributes:
       model: The networks.
       categories: Of the objects it was trained on.
+      labels: What it was trained to find: unified labels, or the frames of the objects' sources.
     """
 
     model: EstimatingModel
     categories: tuple[str, ...]
+    labels: LabelSet = "unified"
+
+    @property
+    def method(self) -> MethodName:
+        """Whose model it is."""
+        return next(name for name, (build, _) in _KINDS.items() if type(self.model) is build)
 
 
 def save_weights(path: Path, trained: TrainedModel) -> None:
@@ -48,7 +57,8 @@ def save_weights(path: Path, trained: TrainedModel) -> None:
     header = {
         "format": FORMAT_VERSION,
         "categories": trained.categories,
-        "kind": _kind(trained.model),
+        "kind": trained.method,
+        "labels": trained.labels,
         "config": dataclasses.asdict(trained.model.config),
     }
     leaves = jax.tree.leaves(trained.model)
@@ -82,6 +92,10 @@ def load_weights(path: Path) -> TrainedModel:
             f"{path}: weights of format {header.get('format')}; this version reads "
             f"{FORMAT_VERSION}: train anew or install the version that wrote them"
         )
+    if header.get("kind") not in _KINDS:
+        raise InputError(
+            f"{path}: weights of method {header.get('kind')!r}; this version knows {', '.join(_KINDS)}"
+        )
     try:
         build, configured = _KINDS[header["kind"]]
         blank = build(configured(header["config"]), rng=np.random.default_rng(0))
@@ -89,12 +103,13 @@ def load_weights(path: Path) -> TrainedModel:
         if [leaf.shape for leaf in shapes] != [array.shape for array in arrays]:
             raise ValueError("shapes")
         categories = tuple(header["categories"])
+        labels = header.get("labels", "unified")  # older files are all of unified labels
     except (KeyError, TypeError, ValueError):
         raise InputError(
             f"{path}: the weights do not fit their configuration; train anew"
         ) from None
     model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
-    return TrainedModel(model, categories)
+    return TrainedModel(model, categories, labels)
 
 
 class replacing:  # noqa: N801
@@ -136,11 +151,7 @@ def _tuples(stored: dict[str, Any]) -> dict[str, Any]:
     return {k: tuple(v) if isinstance(v, list) else v for k, v in stored.items()}
 
 
-_KINDS: dict[str, tuple[Callable[..., Any], Callable[[dict[str, Any]], Any]]] = {
+_KINDS: dict[MethodName, tuple[Callable[..., Any], Callable[[dict[str, Any]], Any]]] = {
     "ours": (PoseModel, _model_config),
     "cppf": (CppfModel, _cppf_config),
 }
-
-
-def _kind(model: EstimatingModel) -> str:
-    return next(kind for kind, (build, _) in _KINDS.items() if isinstance(model, build))  # pyright: ignore[reportArgumentType]

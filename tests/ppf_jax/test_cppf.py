@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 from half_visible import half_visible_clouds
 
+from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.clouds import batch_clouds
-from manipose_mj.ppf_jax.cppf import CppfLoss, CppfModel, cppf_config
+from manipose_mj.ppf_jax.cppf import CppfLoss, CppfModel, cppf_config, unoriented
 from manipose_mj.ppf_jax.cppf_voting import CppfOutputs, directed, towards, voted_estimate
+from manipose_mj.ppf_jax.estimator import PoseEstimator
+from manipose_mj.ppf_jax.methods import METHODS
 from manipose_mj.ppf_jax.training import CURVE_FILE, TrainingConfig, train
 from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
@@ -42,6 +45,16 @@ def test_the_settings_cover_the_objects(mugs, config):
     assert config.reach[0] == pytest.approx(far, abs=1e-3)
     assert np.allclose(np.exp(config.mean_log_extents), mugs[0].extents, rtol=1e-3)
     assert not config.symmetry.axial
+    assert config.symmetry.unsigned_x  # as published for mugs, whose ends differ
+
+
+def test_normals_do_not_tell_the_side_that_is_seen(mugs):
+    normals = jnp.asarray(mugs[0].normals)
+    signed = unoriented(normals)
+    assert jnp.array_equal(signed, unoriented(-normals))
+    assert jnp.array_equal(jnp.abs(signed), jnp.abs(normals))
+    axes = jnp.eye(3)
+    assert jnp.array_equal(unoriented(-axes), jnp.diag(jnp.array([1.0, -1.0, 1.0])))
 
 
 def test_votes_that_know_the_truth_give_it_back(mugs, config):
@@ -86,12 +99,25 @@ def test_it_trains_estimates_and_is_kept(mugs, config, tmp_path):
     curve = json.loads((tmp_path / CURVE_FILE).read_text())
     for part in ("mu", "nu", "x", "y"):
         assert np.mean([r[part] for r in curve[-3:]]) < np.mean([r[part] for r in curve[:3]]), part
-    save_weights(tmp_path / "cppf.npz", TrainedModel(model, ("mug",)))
-    back = load_weights(tmp_path / "cppf.npz").model
-    assert back.config == config
+    path = tmp_path / "cppf.npz"
+    save_weights(path, TrainedModel(model, ("mug",), "original"))
+    back = load_weights(path)
+    assert (back.method, back.labels, back.model.config) == ("cppf", "original", config)
+    assert PoseEstimator.from_file(path, method="cppf", labels="original").trained.labels
+    with pytest.raises(InputError, match="weights of method cppf; expected ours"):
+        PoseEstimator.from_file(path, method="ours")
+    with pytest.raises(InputError, match="trained on original labels; expected unified"):
+        PoseEstimator.from_file(path, labels="unified")
     batch = next(batches(0))
-    found = back.estimate(
-        *(jnp.asarray(v[0]) for v in (batch.points, batch.normals, batch.mask)),
-        key=jax.random.key(0),
-    )
-    assert found.poses.shape == (1, 4, 4) and bool(jnp.all(jnp.isfinite(found.poses)))
+    few = batch.mask & (np.arange(batch.mask.shape[1]) < 12)  # fewer points than neighbours
+    estimate = jax.jit(lambda *cloud: back.model.estimate(*cloud, key=jax.random.key(0)))
+    for mask in (batch.mask, few):
+        found = estimate(batch.points[0], batch.normals[0], mask[0])
+        assert found.poses.shape == (1, 4, 4) and bool(jnp.all(jnp.isfinite(found.poses)))
+
+
+def test_every_method_makes_a_model_that_its_weights_know(mugs):
+    for name, method in METHODS.items():
+        model = method.build(method.configured(mugs), rng=np.random.default_rng(0))
+        assert TrainedModel(model, ("mug",)).method == name
+        assert hash(method.training) and method.points <= 1024
