@@ -6,6 +6,7 @@ whether it is met is a pure function of the scene's state, NumPy or JAX.
 
 from __future__ import annotations
 
+import abc
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -61,19 +62,14 @@ class PoseGoal:
 
 
 @dataclass(frozen=True)
-class OrientationGoal:
-    """The object's label shall rest on the table turned as `rotation` (`R_world_label`), up to its
-    symmetry; anywhere, released."""
+class TurnedGoal(abc.ABC):
+    """The object shall rest on the table turned in some way; anywhere, released."""
 
     object: str
-    rotation: Float[np.ndarray, "3 3"]
 
+    @abc.abstractmethod
     def error(self, state: SceneState) -> Float[Array, "*b"]:
         """The angle that is left [rad]."""
-        thing = state.objects[self.object]
-        xp = namespace(thing.label_pose)
-        wanted = xp.asarray(compose(self.rotation, np.zeros(3)), dtype=thing.label_pose.dtype)
-        return pose_error(thing.label_pose, wanted, thing.label.symmetry)[1]
 
     def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
         """Whether it holds in this state."""
@@ -92,11 +88,24 @@ class OrientationGoal:
 
 
 @dataclass(frozen=True)
-class UprightGoal:
+class OrientationGoal(TurnedGoal):
+    """The object's label shall rest on the table turned as `rotation` (`R_world_label`), up to its
+    symmetry; anywhere, released."""
+
+    rotation: Float[np.ndarray, "3 3"]
+
+    def error(self, state: SceneState) -> Float[Array, "*b"]:
+        """The angle that is left [rad]."""
+        thing = state.objects[self.object]
+        xp = namespace(thing.label_pose)
+        wanted = xp.asarray(compose(self.rotation, np.zeros(3)), dtype=thing.label_pose.dtype)
+        return pose_error(thing.label_pose, wanted, thing.label.symmetry)[1]
+
+
+@dataclass(frozen=True)
+class UprightGoal(TurnedGoal):
     """The object shall rest upright, its label's X along the vertical, turned about it as it likes;
     anywhere, released."""
-
-    object: str
 
     def error(self, state: SceneState) -> Float[Array, "*b"]:
         """The angle between the label's X and the vertical [rad]."""
@@ -105,21 +114,6 @@ class UprightGoal:
         # From the chord: the cosine is too flat near nothing and near half a turn.
         chord = xp.sqrt(xp.sum((up - xp.asarray([0.0, 0.0, 1.0], dtype=up.dtype)) ** 2, axis=-1))
         return 2 * xp.asin(xp.clip(chord / 2, 0.0, 1.0))
-
-    def met(self, state: SceneState, tolerance: Tolerance) -> Bool[Array, "*b"]:
-        """Whether it holds in this state."""
-        thing = state.objects[self.object]
-        rest = at_rest(thing.linear_speed, thing.angular_speed, tolerance)
-        on_table = thing.label_pose[..., 2, 3] > 0.0
-        return (self.error(state) < tolerance.rotation) & rest & on_table & ~thing.touched
-
-    def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
-        """Reach, hold, turn, set down."""
-        thing = state.objects[self.object]
-        angle = self.error(state)
-        placed = (angle < tolerance.rotation) & (thing.label_pose[..., 2, 3] > 0.0)
-        left = shaping.turn_as_way(angle)
-        return shaping.object_progress(state, thing, placed, left, tolerance)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,6 +18,15 @@ ZONES: tuple[Zone, ...] = ("table", "by", "under", "in")
 _ENOUGH = 4  # grasps with room at start and goal
 _MAX_DRAWS = 400
 _TURNS = 8  # of an axis of symmetry that are looked at
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """How an object stands at a shelf: zone, index of its stable pose, `T_world_object`."""
+
+    zone: Zone
+    stable: int
+    pose: Float[np.ndarray, "4 4"]
 
 
 @dataclass(frozen=True)
@@ -61,9 +70,10 @@ class ShelfDraw:
                 continue
             if np.linalg.norm((start_pose - goal_pose)[:3, 3]) < self.min_distance:
                 continue
-            serving = self._with_room(asset, start, start_pose, shelf_pose, start_zone)
+            serving = self._with_room(asset, _Stand(start_zone, start, start_pose), shelf_pose)
             if serving.sum() > most:
-                serving &= self._at_goal(asset, goal, goal_pose, shelf_pose, goal_zone)
+                at_goal = _Stand(goal_zone, goal, goal_pose)
+                serving &= self._with_room_at_goal(asset, at_goal, shelf_pose)
             if serving.sum() > most:
                 best, most = (start_pose, goal_pose), int(serving.sum())
             if most >= _ENOUGH:
@@ -73,32 +83,23 @@ class ShelfDraw:
         return best
 
     def _with_room(
-        self,
-        asset: Asset,
-        stable: int,
-        pose: Float[np.ndarray, "4 4"],
-        shelf_pose: Float[np.ndarray, "4 4"],
-        zone: Zone,
+        self, asset: Asset, stand: _Stand, shelf_pose: Float[np.ndarray, "4 4"]
     ) -> Bool[np.ndarray, "n"]:
+        """Which of the asset's grasps have room there."""
         assert asset.grasps is not None
-        mask = asset.grasps.clear[:, stable].copy()
-        tcp_poses = pose @ asset.grasps.poses[mask]
-        level = self.places.level(zone)
+        mask = asset.grasps.clear[:, stand.stable].copy()
+        tcp_poses = stand.pose @ asset.grasps.poses[mask]
+        level = self.places.level(stand.zone)
         mask[mask] = grasps_with_room(tcp_poses, shelf_pose, self.places.shelf, level)
         return mask
 
-    def _at_goal(
-        self,
-        asset: Asset,
-        stable: int,
-        pose: Float[np.ndarray, "4 4"],
-        shelf_pose: Float[np.ndarray, "4 4"],
-        zone: Zone,
+    def _with_room_at_goal(
+        self, asset: Asset, stand: _Stand, shelf_pose: Float[np.ndarray, "4 4"]
     ) -> Bool[np.ndarray, "n"]:
         """As at the start, in any of the poses that symmetry makes equal."""
         label = asset.label
         found = np.zeros(len(asset.grasps or ()), bool)
         for turn in label.symmetry.sampled(_TURNS):
             equal = label.pose @ compose(turn, np.zeros(3)) @ invert(label.pose)
-            found |= self._with_room(asset, stable, pose @ equal, shelf_pose, zone)
+            found |= self._with_room(asset, replace(stand, pose=stand.pose @ equal), shelf_pose)
         return found

@@ -65,11 +65,14 @@ class Openable:
             return own
         return tuple(catalogue.load(self.category, i) for i in self.instances[options.split])
 
-    def objects(self, options: TaskOptions, furniture: tuple[Asset, ...]) -> tuple[Asset, ...]:
-        """The user's rigid objects, or those of the built-in ones of the split that fit."""
+    def objects_and_furniture(
+        self, options: TaskOptions
+    ) -> tuple[tuple[Asset, ...], tuple[Asset, ...]]:
+        """The user's rigid objects, or those of the built-in ones of the split that fit; furniture."""
+        furniture = self.furniture(options)
         _, own = split_objects(options.objects, (), ())
         if own:
-            return own
+            return own, furniture
         if options.split == "train":
             things = [catalogue.load(category, i) for category, i in self.things]
         else:
@@ -78,7 +81,7 @@ class Openable:
         parts = [choose_part(asset, self.choice, hollow=True) for asset in furniture]
         fitting = [a for a in things if any(p.cavity and ways_to_lie(a, p.cavity) for p in parts)]
         # Where nothing fits, the task says so.
-        return tuple(fitting or things)
+        return tuple(fitting or things), furniture
 
 
 _TEST_INSTANCE = 4
@@ -139,11 +142,7 @@ OPENABLES: dict[str, Openable] = {
 
 
 def _open(part: Openable) -> TaskFactory:
-    def factory(options: TaskOptions) -> OpenClose:
-        _refuse_rigid(options, "open")
-        config = OpenCloseConfig(wanted="open", standing=part.standing)
-        return OpenClose(part.furniture(options), part.choice, config, options)
-
+    factory = _moving(part, "open", OpenCloseConfig(wanted="open", standing=part.standing))
     factory.__doc__ = f"""Open {part.phrase}, by nine tenths of its range or more.
 
     It is shut at first. Any articulated asset that has such a part with a handle can take its place.
@@ -152,11 +151,8 @@ def _open(part: Openable) -> TaskFactory:
 
 
 def _close(part: Openable) -> TaskFactory:
-    def factory(options: TaskOptions) -> OpenClose:
-        _refuse_rigid(options, "close")
-        config = OpenCloseConfig(wanted="shut", standing=part.standing, start_open=part.start_open)
-        return OpenClose(part.furniture(options), part.choice, config, options)
-
+    config = OpenCloseConfig(wanted="shut", standing=part.standing, start_open=part.start_open)
+    factory = _moving(part, "close", config)
     factory.__doc__ = f"""Shut {part.phrase}, by nine tenths of its range or more.
 
     It is open by {part.start_open[0]:.0%} to {part.start_open[1]:.0%} at first. Any articulated asset that has such
@@ -166,13 +162,12 @@ def _close(part: Openable) -> TaskFactory:
 
 
 def _store(part: Openable) -> TaskFactory:
+    config = StoreConfig(
+        standing=part.standing, shut=part.shut, max_fillers=2, settle=_SETTLE_INSIDE
+    )
+
     def factory(options: TaskOptions) -> Store:
-        config = StoreConfig(
-            standing=part.standing, shut=part.shut, max_fillers=2, settle=_SETTLE_INSIDE
-        )
-        furniture = part.furniture(options)
-        objects = part.objects(options, furniture)
-        return Store(objects, furniture, part.choice, config, options)
+        return Store(*part.objects_and_furniture(options), part.choice, config, options)
 
     factory.__doc__ = f"""Store an object in {part.phrase}: open it, put the object inside, shut it.
 
@@ -184,19 +179,26 @@ def _store(part: Openable) -> TaskFactory:
 
 
 def _take_out(part: Openable) -> TaskFactory:
+    config = TakeOutConfig(
+        standing=part.standing, shut=part.shut, max_fillers=1, settle=_SETTLE_INSIDE
+    )
+
     def factory(options: TaskOptions) -> TakeOut:
-        config = TakeOutConfig(
-            standing=part.standing, shut=part.shut, max_fillers=1, settle=_SETTLE_INSIDE
-        )
-        furniture = part.furniture(options)
-        objects = part.objects(options, furniture)
-        return TakeOut(objects, furniture, part.choice, config, options)
+        return TakeOut(*part.objects_and_furniture(options), part.choice, config, options)
 
     factory.__doc__ = f"""Take an object out of {part.phrase}: open it, set the object down, shut it.
 
     The object lies near the cavity's open side; another one may lie there too. It counts that the
     object rests on the table in the marked area, released, and that the drawer or door is shut.
     """
+    return factory
+
+
+def _moving(part: Openable, verb: str, config: OpenCloseConfig) -> TaskFactory:
+    def factory(options: TaskOptions) -> OpenClose:
+        _refuse_rigid(options, verb)
+        return OpenClose(part.furniture(options), part.choice, config, options)
+
     return factory
 
 
