@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,36 +11,54 @@ from tyro.conf import Positional, arg
 if TYPE_CHECKING:
     from asset_pipeline.inventory import Entry
 
-Directory = Annotated[Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")]
 Text = Annotated[str | None, arg(help_behavior_hint="")]
 
 
-def list_objects(
-    directory: Directory = None,
-    /,
-    *,
-    category: Text = None,
-    type: Text = None,
-    split: Text = None,
-    source: Text = None,
-    graspable: Annotated[Literal["yes", "no"] | None, arg(help_behavior_hint="")] = None,
-    json: bool = False,
-) -> None:
-    """List assets with their category, type, split, source and whether a Panda can grasp them.
+@dataclass(frozen=True)
+class Selection:
+    """Which assets.
 
-    Args:
+    Attributes:
       directory: Folder of assets; without it the built-in objects.
       category: Only this category.
       type: Only this labelling rule: axial, mirror, functional, articulated.
       split: Only train or only test.
       source: Only from sources whose name contains this.
       graspable: Only those with, or without, 20 grasps that survive a lift and shake in simulation.
+    """
+
+    directory: Annotated[Positional[Path | None], arg(metavar="[DIR]", help_behavior_hint="")] = (
+        None
+    )
+    category: Text = None
+    type: Text = None
+    split: Text = None
+    source: Text = None
+    graspable: Annotated[Literal["yes", "no"] | None, arg(help_behavior_hint="")] = None
+
+    def entries(self) -> list[Entry]:
+        """Those assets."""
+        from asset_pipeline.inventory import Filter, built_in, in_folder, select
+
+        entries = built_in() if self.directory is None else in_folder(self.directory)
+        hold = None if self.graspable is None else self.graspable == "yes"
+        return select(entries, Filter(self.category, self.type, self.split, self.source, hold))
+
+
+Selected = Annotated[Selection, arg(name="")]
+
+
+def list_objects(selection: Selected = Selection(), *, json: bool = False) -> None:
+    """List assets with their category, type, split, source and whether a Panda can grasp them.
+
+    Args:
+      selection: Which assets.
       json: Print JSON, for other programs.
     """
     from asset_pipeline.inventory import as_json
     from manipose_mj.cli import output
 
-    rows = _selected(directory, category, type, split, source, graspable)
+    rows = selection.entries()
     if json:
         output.write_json([as_json(entry) for entry in rows])
         return
@@ -54,32 +73,17 @@ def list_objects(
     console.print(f"{len(rows)} assets")
 
 
-def show_statistics(
-    directory: Directory = None,
-    /,
-    *,
-    category: Text = None,
-    type: Text = None,
-    split: Text = None,
-    source: Text = None,
-    graspable: Annotated[Literal["yes", "no"] | None, arg(help_behavior_hint="")] = None,
-    json: bool = False,
-) -> None:
+def show_statistics(selection: Selected = Selection(), *, json: bool = False) -> None:
     """Count assets by category, with the share that a Panda can grasp; filters as for `list`.
 
     Args:
-      directory: Folder of assets; without it the built-in objects.
-      category: Only this category.
-      type: Only this labelling rule.
-      split: Only train or only test.
-      source: Only from sources whose name contains this.
-      graspable: Only those with, or without, 20 grasps that hold.
+      selection: Which assets.
       json: Print JSON, for other programs.
     """
     from asset_pipeline.inventory import statistics
     from manipose_mj.cli import output
 
-    counts = statistics(_selected(directory, category, type, split, source, graspable))
+    counts = statistics(selection.entries())
     if json:
         output.write_json(counts)
         return
@@ -97,18 +101,3 @@ def show_statistics(
         f"{counts['rigid']} rigid and {counts['articulated']} articulated assets "
         f"in {len(counts['categories'])} categories"
     )
-
-
-def _selected(
-    directory: Path | None,
-    category: str | None,
-    type_: str | None,
-    split: str | None,
-    source: str | None,
-    graspable: str | None,
-) -> list[Entry]:
-    from asset_pipeline.inventory import Filter, built_in, in_folder, select
-
-    entries = built_in() if directory is None else in_folder(directory)
-    hold = None if graspable is None else graspable == "yes"
-    return select(entries, Filter(category, type_, split, source, hold))
