@@ -10,10 +10,13 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import trimesh
 
-from asset_pipeline.scan import ScanItem, load_scan_mesh, sha256
+from asset_pipeline.assets import Provenance
+from asset_pipeline.scan import Scan, ScanItem, load_scan_mesh, sha256
 from asset_pipeline.sources import archives
+from asset_pipeline.sources.categories import Kind
 from asset_pipeline.sources.ply_rows import check_rows
 from asset_pipeline.sources.wavefront_lines import read_lines
 from manipose_mj.errors import InputError
@@ -126,6 +129,46 @@ def unpacked(item: ScanItem, members: Collection[PurePosixPath]) -> Iterator[Pat
         folder = Path(scratch) / "unpacked"
         archives.extract(item.path, folder, [str(m) for m in members])
         yield folder
+
+
+@contextmanager
+def opened_scan(
+    item: ScanItem,
+    files: Sequence[PurePosixPath],
+    *,
+    kind: Kind,
+    up: tuple[float, float, float],
+    source: str,
+    licence: str,
+    unit: float = 1.0,
+) -> Iterator[Scan]:
+    """Read one object of which nothing but a mesh and its texture is published.
+
+    Args:
+      item: The object.
+      files: Its mesh, and where its texture may be.
+      kind: What it is.
+      up: In the mesh frame.
+      source: The data set's name.
+      licence: Of the data set.
+      unit: Length of the file's unit [m].
+
+    Raises:
+      InputError: The archive or the mesh in it cannot be used.
+    """
+    with unpacked(item, files) as folder:
+        mesh = load_mesh(item, folder, unit=unit)
+        textures = [folder / file for file in files[1:]]
+        yield Scan(
+            name=item.name,
+            category=kind.category,
+            object_type=kind.object_type,
+            mesh=mesh,
+            texture=next((t for t in textures if t.is_file()), None),
+            up=np.array(up),
+            mass=None,
+            provenance=Provenance(source, item.name, licence, hashes(item, files)),
+        )
 
 
 def load_mesh(item: ScanItem, folder: Path, *, unit: float = 1.0) -> trimesh.Trimesh:

@@ -9,13 +9,9 @@ published. CC BY 4.0; Downs et al., "Google Scanned Objects", ICRA 2022.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
-from asset_pipeline.assets import Provenance
 from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of_product
@@ -52,27 +48,20 @@ def inputs(item: ScanItem) -> dict[str, str]:
     return collection.hashes(item, _files(item))
 
 
-@contextmanager
-def opened(item: ScanItem) -> Iterator[Scan]:
+def opened(item: ScanItem) -> AbstractContextManager[Scan]:
     """Read one object; its texture stays there as long as the context does.
 
     Raises:
       InputError: The archive or the mesh in it cannot be used.
     """
-    kind = kind_of_product(item.name)
-    with collection.unpacked(item, _files(item)) as folder:
-        mesh = collection.load_mesh(item, folder)
-        textures = [folder / m for m in _files(item)[1:]]
-        yield Scan(
-            name=item.name,
-            category=kind.category,
-            object_type=kind.object_type,
-            mesh=mesh,
-            texture=next((t for t in textures if t.is_file()), None),
-            up=np.array([0.0, 0.0, 1.0]),
-            mass=None,
-            provenance=Provenance(SOURCE, item.name, LICENCE, inputs(item)),
-        )
+    return collection.opened_scan(
+        item,
+        _files(item),
+        kind=kind_of_product(item.name),
+        up=(0.0, 0.0, 1.0),
+        source=SOURCE,
+        licence=LICENCE,
+    )
 
 
 def _name(root: Path, mesh: PurePosixPath) -> str:

@@ -10,13 +10,9 @@ of a scan that lies otherwise has to be corrected. No mass is published. CC BY 4
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
-from asset_pipeline.assets import Provenance
 from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of
@@ -47,27 +43,21 @@ def inputs(item: ScanItem) -> dict[str, str]:
     return collection.hashes(item, _files(item))
 
 
-@contextmanager
-def opened(item: ScanItem) -> Iterator[Scan]:
+def opened(item: ScanItem) -> AbstractContextManager[Scan]:
     """Read one object; its texture stays there as long as the context does.
 
     Raises:
       InputError: The archive or the mesh in it cannot be used.
     """
-    kind = kind_of(re.sub(r"_\d+$", "", item.name))
-    with collection.unpacked(item, _files(item)) as folder:
-        mesh = collection.load_mesh(item, folder, unit=UNIT)
-        texture = folder / PurePosixPath(item.member).with_suffix(".jpg")
-        yield Scan(
-            name=item.name,
-            category=kind.category,
-            object_type=kind.object_type,
-            mesh=mesh,
-            texture=texture if texture.is_file() else None,
-            up=np.array([0.0, 1.0, 0.0]),
-            mass=None,
-            provenance=Provenance(SOURCE, item.name, LICENCE, inputs(item)),
-        )
+    return collection.opened_scan(
+        item,
+        _files(item),
+        kind=kind_of(re.sub(r"_\d+$", "", item.name)),
+        up=(0.0, 1.0, 0.0),
+        unit=UNIT,
+        source=SOURCE,
+        licence=LICENCE,
+    )
 
 
 def _name(root: Path, mesh: PurePosixPath) -> str:
