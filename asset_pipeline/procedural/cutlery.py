@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -34,6 +34,30 @@ class FlatHandle:
     waist: float = 0.85
     thick: float = 0.0026
     round: float = 1.0
+
+
+def drawn_handle(
+    rng: np.random.Generator,
+    *,
+    length: float,
+    end: float,
+    neck: float,
+    thick: tuple[float, float],
+) -> FlatHandle:
+    """A handle of pressed steel: waist, thickness in this range and rounding as `rng` draws them [m]."""
+    return FlatHandle(
+        length=length,
+        end=end,
+        neck=neck,
+        waist=round(float(rng.uniform(0.55, 0.95)), 3),
+        thick=round(float(rng.uniform(*thick)), 4),
+        round=round(float(rng.choice((0.35, 0.7, 1.0, 1.5))), 2),
+    )
+
+
+def moulded_handle(handle: FlatHandle) -> FlatHandle:
+    """The same in plastic, which takes more material: wider at the neck and thicker."""
+    return replace(handle, neck=handle.neck + 0.002, thick=handle.thick + 0.001)
 
 
 def flat_handle(handle: FlatHandle, *, rgba: Colour, density: float) -> Piece:

@@ -22,7 +22,9 @@ from asset_pipeline.procedural.cutlery import (
     FlatHandle,
     across,
     dip,
+    drawn_handle,
     flat_handle,
+    moulded_handle,
     side_profile,
     spread,
 )
@@ -82,15 +84,14 @@ def design(index: int) -> Fork:
     whole, palm, tine, width = (round(float(rng.uniform(*r)), 4) for r in ranges)
     scale = whole / 0.20
     slim = index % 3 == 1  # modern: hardly wider at its end
-    handle = FlatHandle(
+    handle = drawn_handle(
+        rng,
         length=round(whole - palm - tine, 4),
         end=round(
             scale * float(rng.uniform(0.0125, 0.0145) if slim else rng.uniform(0.017, 0.022)), 4
         ),
         neck=round(scale * float(rng.uniform(0.0070, 0.0085)), 4),
-        waist=round(float(rng.uniform(0.55, 0.95)), 3),
-        thick=round(float(rng.uniform(0.0024, 0.0031)), 4),
-        round=round(float(rng.choice((0.35, 0.7, 1.0, 1.5))), 2),
+        thick=(0.0024, 0.0031),
     )
     share = rng.uniform(0.135, 0.150)  # a gap's of the width
     fork = Fork(
@@ -105,8 +106,8 @@ def design(index: int) -> Fork:
         rgba=in_turn(index, _METALS),
     )
     if index % 7 == 5:
-        handle = replace(handle, neck=handle.neck + 0.002, thick=handle.thick + 0.001)
         colour = in_turn(index // 7 + 1, _PLASTICS)
+        handle = moulded_handle(handle)
         return replace(fork, handle=handle, wall=0.0026, density=PLASTIC, rgba=colour)
     return fork
 

@@ -23,7 +23,9 @@ from asset_pipeline.procedural.cutlery import (
     FlatHandle,
     across,
     dip,
+    drawn_handle,
     flat_handle,
+    moulded_handle,
     side_profile,
     spread,
 )
@@ -90,13 +92,12 @@ def design(index: int) -> Spoon:
         round(float(rng.uniform(*r)), 4) for r in _SIZES[index % len(_SIZES)]
     )
     slim = index % 3 == 2  # modern: hardly wider at its end
-    handle = FlatHandle(
+    handle = drawn_handle(
+        rng,
         length=round(whole - bowl, 4),
         end=round(0.72 * end, 4) if slim else end,
         neck=neck,
-        waist=round(float(rng.uniform(0.55, 0.95)), 3),
-        thick=round(float(rng.uniform(0.0023, 0.0030)), 4),
-        round=round(float(rng.choice((0.35, 0.7, 1.0, 1.5))), 2),
+        thick=(0.0023, 0.0030),
     )
     spoon = Spoon(
         handle,
@@ -107,8 +108,8 @@ def design(index: int) -> Spoon:
         rgba=in_turn(index, _METALS),
     )
     if index % 8 == 6:
-        handle = replace(handle, neck=neck + 0.002, thick=handle.thick + 0.001)
         colour = in_turn(index // 8 + 1, _PLASTICS)
+        handle = moulded_handle(handle)
         return replace(spoon, handle=handle, wall=0.0026, density=PLASTIC, rgba=colour)
     return spoon
 

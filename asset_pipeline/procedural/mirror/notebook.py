@@ -18,6 +18,7 @@ import trimesh
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
 from asset_pipeline.procedural.handles import ALONG_Y
+from asset_pipeline.procedural.lying import LONG_Y, OVER, along_face
 from asset_pipeline.procedural.moulded import (
     facing,
     moulded,
@@ -26,13 +27,7 @@ from asset_pipeline.procedural.moulded import (
     rounded_polygon,
     slab_loops,
 )
-from asset_pipeline.procedural.pieces import (
-    UPRIGHT,
-    AreaBox,
-    Piece,
-    placed_shape,
-    rigid_specimen,
-)
+from asset_pipeline.procedural.pieces import UPRIGHT, AreaBox, Piece, placed_shape, rigid_specimen
 from asset_pipeline.procedural.revolution import wall_wedges
 from asset_pipeline.procedural.snap_strap import snap_strap
 from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
@@ -47,8 +42,6 @@ PITCH = 0.0046  # of the coil [m]
 WIRE = 0.0010  # its filament's radius [m]
 WEDGES = 10
 Style = Literal["bound", "coil", "diary"]
-# Of what is alike from above and below.
-OVER = SymmetryGroup.generated(np.diag([-1.0, 1.0, -1.0])[None])
 
 
 @dataclass(frozen=True)
@@ -137,8 +130,7 @@ def generate(index: int = 0) -> Specimen:
         pieces.append(_strap(book))
     else:
         symmetry = SymmetryGroup.three_planes()
-        # Y lies along the longer side, here y.
-        rotation = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
+        rotation = LONG_Y
     x, y = book.width / 2, book.depth / 2
     return rigid_specimen(
         "notebook",
@@ -188,9 +180,7 @@ def _book(book: Notebook) -> Piece:
 def _on(
     face: np.ndarray, outline: np.ndarray, rgba: Colour, at: tuple[float, float], layer: int = 1
 ) -> Shape:
-    pose = face.copy()
-    pose[:3, 3] += face[:3, :2] @ np.array(at)
-    return printed(outline, pose, rgba, layer)
+    return printed(outline, along_face(face, at), rgba, layer)
 
 
 def _coil(book: Notebook) -> Piece:

@@ -15,13 +15,7 @@ import numpy as np
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.moulded import (
-    facing,
-    moulded,
-    printed,
-    rectangle,
-    slab_loops,
-)
+from asset_pipeline.procedural.moulded import facing, moulded, printed, rectangle, slab_loops
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, loft

@@ -17,20 +17,9 @@ from jaxtyping import Float
 
 from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.handles import ALONG_X
-from asset_pipeline.procedural.moulded import (
-    facing,
-    moulded,
-    printed,
-    rectangle,
-    slab_loops,
-)
-from asset_pipeline.procedural.pieces import (
-    UPRIGHT,
-    AreaBox,
-    Piece,
-    placed,
-    rigid_specimen,
-)
+from asset_pipeline.procedural.lying import LONG_Y, OVER, along_face
+from asset_pipeline.procedural.moulded import facing, moulded, printed, rectangle, slab_loops
+from asset_pipeline.procedural.pieces import UPRIGHT, AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.snap_strap import snap_strap
 from asset_pipeline.procedural.solids import ellipse
 from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
@@ -41,8 +30,6 @@ GOLD: Colour = (0.80, 0.66, 0.34, 1.0)
 SILVER: Colour = (0.76, 0.77, 0.78, 1.0)
 STITCH = 0.0005  # half width of a seam [m]
 NECK = 0.56  # a purse's width at its frame as a share
-# Of what is alike from above and below.
-OVER = SymmetryGroup.generated(np.diag([-1.0, 1.0, -1.0])[None])
 Style = Literal["fold", "tab", "purse"]
 
 
@@ -125,7 +112,7 @@ def generate(index: int = 0) -> Specimen:
     rotation = UPRIGHT
     if wallet.style == "fold":
         pieces, symmetry = [_folded(wallet)], SymmetryGroup.three_planes()
-        rotation = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # Y along the longer side
+        rotation = LONG_Y
     elif wallet.style == "tab":
         pieces, symmetry = [_folded(wallet), _tab(wallet)], SymmetryGroup.identity()
     else:
@@ -167,17 +154,13 @@ def _folded(wallet: Wallet) -> Piece:
 def _seam(wallet: Wallet, face: Float[np.ndarray, "4 4"], inset: float) -> list[Shape]:
     """Stitches along the edges of one side."""
     x, y = wallet.width / 2 - inset, wallet.length / 2 - inset
-    shapes = []
-    for at, half in (
+    seams = (
         ((x, 0), (STITCH, y)),
         ((-x, 0), (STITCH, y)),
         ((0, y), (x, STITCH)),
         ((0, -y), (x, STITCH)),
-    ):
-        pose = face.copy()
-        pose[:3, 3] += face[:3, :2] @ np.array(at, float)
-        shapes.append(printed(rectangle(*half), pose, wallet.seam))
-    return shapes
+    )
+    return [printed(rectangle(*half), along_face(face, at), wallet.seam) for at, half in seams]
 
 
 def _tab(wallet: Wallet) -> Piece:
