@@ -56,22 +56,23 @@ def template(category: str) -> Template:
     return Template(transform(placed, points), normals, diameter)
 
 
-def available() -> dict[str, Matcher]:
-    """The matchers whose libraries are installed."""
+def available() -> tuple[dict[str, Matcher], dict[str, str]]:
+    """The matchers whose libraries can be loaded; of the others, why not."""
     found: dict[str, Matcher] = {}
+    lacking: dict[str, str] = {}
     for name, (library, matcher) in MATCHERS.items():
         try:
             importlib.import_module(library)
-        except ImportError:
-            continue
-        found[name] = matcher
-    return found
+        except (ImportError, OSError) as error:  # not installed; or a system library is missing
+            lacking[name] = str(error)
+        else:
+            found[name] = matcher
+    return found, lacking
 
 
 def opencv_ppf(model: Template) -> Match:
     """OpenCV's `ppf_match_3d` (Drost et al. 2010): the closest fit of its first five, with and without ICP."""
-    import cv2
-
+    cv2: Any = importlib.import_module("cv2")
     # Half this sampling step trains for more than a minute.
     detector = cv2.ppf_match_3d_PPF3DDetector(0.1, 0.05)
     trained = np.hstack([model.points, model.normals]).astype(np.float32)

@@ -1,15 +1,19 @@
-"""Table I: category-level pose from one partial, noisy cloud, ours beside the paper's and the matchers'.
+"""Table I: category-level pose from one partial, noisy cloud: ours, CPPF as published, matchers, the paper's.
 
-    python benchmarks/pose_table.py [--categories bowl mug] [--setting anywhere] [--views 8]
-        [--weights pose] [--no-matchers] [--jobs 1] [--json FILE]
+    python benchmarks/pose_table.py [--categories bowl mug] [--setting anywhere|resting|tasks]
+        [--views 8] [--weights pose] [--no-matchers] [--jobs 1] [--json FILE]
 
 Every method sees the same clouds: views of the catalogue's test objects, which nothing was trained on.
-With `--weights DIR`, ours is `DIR/CATEGORY/weights.npz`, as `manipose pose train` writes it, and on original
-labels `DIR/CATEGORY-original/weights.npz`; without it, the package's own weights. What is not there is left
-out with a line. Matchers see the category's typical object as their template, in the right size of its
-kind, and need `pip install 'manipose-mj[pose-bench]'`. Errors are means, medians in brackets; for mugs also
-as NOCS counts (free about the axis while the handle is hidden). Times: one object after another, for ours
-from bare points, for the matchers with normals given.
+With `--weights DIR`, weights are read from `DIR/FOLDER/weights.npz`, FOLDER being what `manipose pose train`
+names its folder: CATEGORY for ours on unified labels, CATEGORY-original, CATEGORY-cppf, CATEGORY-cppf-original.
+Ours on unified labels are the package's own where DIR has none. What is not there is left out with a line.
+On original labels each estimate is held against the object's frame as its source has it; of an axis of
+revolution, wherever that frame has it, only the direction counts, as with unified labels.
+
+Matchers see the category's typical object as their template, in the right size of its kind, and need
+`pip install 'manipose-mj[pose-bench]'`. Errors are means, medians in brackets; for mugs also as NOCS counts
+(free about the axis while the handle is hidden). Times: one object after another, for networks from bare
+points and on the device that JAX runs on, for matchers on the CPU with normals given.
 
 `--json` writes one row per category, method and label set; figures that a source does not give are null.
 """
@@ -26,11 +30,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pose_matchers import MATCHERS, available, template
+from pose_matchers import Matcher, available, template
 from rich.console import Console
 from rich.table import Table
 
+from manipose_mj.cli.pose_train import WEIGHTS_FILE, folder_name
 from manipose_mj.errors import InputError
+from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.clouds import LabelledCloud
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation import Answers, answers, catalogue_hulls, categories_of
@@ -38,6 +44,7 @@ from manipose_mj.ppf_jax.metrics import pose_errors, summary
 from manipose_mj.ppf_jax.source_frames import SourceLabel
 from manipose_mj.ppf_jax.view_cache import catalogue_clouds, source_labels
 from manipose_mj.ppf_jax.view_settings import view_setting
+from manipose_mj.ppf_jax.weights import LabelSet, MethodName
 
 log = logging.getLogger("pose_table")
 
@@ -50,45 +57,64 @@ PAPER: dict[str, tuple[float, float]] = {
     "hammer": (1.68, 9.0),
     "razor": (1.20, 12.0),
 }
-OURS = "ours"
 Row = dict[str, Any]
+# As rows are called, by whose weights they are.
+NETWORKS: dict[MethodName, str] = {"cppf": "CPPF as published", "ours": "ours"}
+SHOWN_RECALLS = ((5, 2), (10, 2), (10, 5))  # [deg, cm]
+LABEL_SETS: tuple[LabelSet, ...] = ("unified", "original")
 
 
 def rows_of(
-    category: str, clouds: Sequence[LabelledCloud], weights: Path | None, matchers: bool, jobs: int
+    category: str,
+    clouds: Sequence[LabelledCloud],
+    weights: Path | None,
+    matchers: dict[str, Matcher],
+    jobs: int,
 ) -> Iterator[Row]:
     """The table's rows of one category."""
     if category in PAPER:
         origin, degrees = PAPER[category]
         yield _row(category, "paper", "unified", {"origin_cm_mean": origin, "deg_mean": degrees})
-    for labels in ("unified", "original"):
-        estimator = _estimator(category, weights, labels)
-        if estimator is not None:
-            sources = source_labels(clouds, jobs=jobs) if labels == "original" else None
-            yield _measured(category, OURS, labels, clouds, answers(estimator, clouds), sources)
-    if not matchers:
-        return
-    shape = template(category)
-    for name, matcher in available().items():
+    frames: dict[str, SourceLabel] | None = None
+    for method, name in NETWORKS.items():
+        for labels in LABEL_SETS:
+            estimator = _estimator(category, weights, method, labels)
+            if estimator is None:
+                continue
+            if labels == "original" and frames is None:
+                frames = source_labels(clouds, jobs=jobs)
+            sources = frames if labels == "original" else None
+            yield _measured(category, name, labels, clouds, answers(estimator, clouds), sources)
+    shape = template(category) if matchers else None
+    for name, matcher in matchers.items():
+        assert shape is not None
         match, poses, spent = matcher(shape), [], []
         for cloud in clouds:
             begin = time.perf_counter()
-            poses.append(match(cloud.points, cloud.normals))
+            pose = match(cloud.points, cloud.normals)
             spent.append(time.perf_counter() - begin)
+            found = np.isfinite(pose).all()
+            poses.append(pose if found else compose(np.eye(3), cloud.points.mean(axis=0)))
         none = np.full(len(clouds), np.nan)
-        found = Answers(np.stack(poses), none, 1e3 * float(np.median(spent)))
-        yield _measured(category, name, "unified", clouds, found, None)
+        answered = Answers(np.stack(poses), none, 1e3 * float(np.median(spent)))
+        yield _measured(category, name, "unified", clouds, answered, None)
 
 
-def _estimator(category: str, weights: Path | None, labels: str) -> PoseEstimator | None:
-    suffix = "" if labels == "unified" else "-original"
+def _estimator(
+    category: str, weights: Path | None, method: MethodName, labels: LabelSet
+) -> PoseEstimator | None:
+    """From a folder of trainings, else from the package; None, with a line, where there is none."""
     try:
+        path = None
         if weights is not None:
-            return PoseEstimator.from_file(weights / f"{category}{suffix}" / "weights.npz")
-        return PoseEstimator.load(category) if labels == "unified" else None
+            path = weights / folder_name(category, method, labels) / WEIGHTS_FILE
+        if (method, labels) == ("ours", "unified") and (path is None or not path.is_file()):
+            return PoseEstimator.load(category)
+        if path is not None:
+            return PoseEstimator.from_file(path, method=method, labels=labels)
     except InputError as error:
-        log.warning("%s, %s labels: left out (%s)", category, labels, error)
-        return None
+        log.warning("%s, %s, %s labels: left out (%s)", category, method, labels, error)
+    return None
 
 
 def _measured(
@@ -115,7 +141,9 @@ def _row(category: str, method: str, labels: str, figures: dict[str, float | int
 def table_of(rows: Sequence[Row], setting: str) -> Table:
     """The rows as people read them: a line for each method, a column for each category."""
     categories = list(dict.fromkeys(row["category"] for row in rows))
-    table = Table("method", "labels", title=f"origin cm / orientation deg, {setting}")
+    limits = ", ".join(f"{deg} deg {cm} cm" for deg, cm in SHOWN_RECALLS)
+    title = f"origin cm / orientation deg, {setting}; recall at {limits} in %"
+    table = Table("method", "labels", title=title)
     for category in categories:
         table.add_column(category, justify="right")
     table.add_column("ms", justify="right")
@@ -128,6 +156,10 @@ def table_of(rows: Sequence[Row], setting: str) -> Table:
     return table
 
 
+def _recall(degrees: int, cm: int) -> str:
+    return f"recall_{degrees}deg_{cm}cm"
+
+
 def _cell(row: Row | None) -> str:
     if row is None:
         return "-"
@@ -135,6 +167,7 @@ def _cell(row: Row | None) -> str:
     if row["deg_median"] is None:
         return text
     text += f"\n({row['origin_cm_median']:.2f} / {row['deg_median']:.1f})"
+    text += "\n" + " ".join(f"{100 * row[_recall(*limit)]:.0f}" for limit in SHOWN_RECALLS)
     text += f"\nflipped {row['flipped']:.1%}"
     if row["category"] == "mug" and row["labels"] == "unified":
         text += f"\nNOCS {row['nocs_deg_mean']:.1f} ({row['nocs_deg_median']:.1f})"
@@ -147,7 +180,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--categories", nargs="+", default=list(PAPER), metavar="NAME")
-    parser.add_argument("--setting", default="anywhere")
+    parser.add_argument("--setting", default="anywhere", help="such as anywhere, resting, tasks")
     parser.add_argument("--views", type=int, default=8, help="of each of the test objects")
     parser.add_argument("--weights", type=Path, metavar="DIR")
     parser.add_argument("--no-matchers", action="store_true")
@@ -159,20 +192,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         setting = view_setting(options.setting)
         for category in options.categories:
             categories_of(category)
+        matchers, lacking = ({}, {}) if options.no_matchers else available()
+        for name, why in lacking.items():
+            log.warning("%s: left out (%s; extra pose-bench)", name, why)
         rows: list[Row] = []
         for category in options.categories:
             clouds = catalogue_clouds(
                 category, "test", setting, views=options.views, jobs=options.jobs
             )
-            rows += rows_of(
-                category, clouds, options.weights, not options.no_matchers, options.jobs
-            )
+            for row in rows_of(category, clouds, options.weights, matchers, options.jobs):
+                rows.append({**row, "setting": options.setting})
     except InputError as error:
         print(f"pose_table: {error}", file=sys.stderr)
         return 2
-    missing = [] if options.no_matchers else sorted(set(MATCHERS) - set(available()))
-    if missing:
-        log.warning("not installed, left out: %s (extra pose-bench)", ", ".join(missing))
     width = None if sys.stdout.isatty() else 160
     Console(width=width).print(table_of(rows, options.setting))
     if options.json is not None:
