@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,6 +13,7 @@ from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
 WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
+HELD_OUT = "anywhere"  # the setting that the curve's errors are of, as the tables are
 Name = Annotated[Positional[str], arg(metavar="CATEGORY|TYPE")]
 
 
@@ -72,8 +74,10 @@ def train_pose(
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)
-    held_out = source.rendered("test", setting, 1 + checks * batch // source.objects("test"))
-    stream = batch_stream(held_out, batch, seed, points=chosen.points)(0)
+    held_out = source.rendered("test", HELD_OUT, 1 + checks * batch // source.objects("test"))
+    config = chosen.configured(clouds)
+    stream = batch_stream(held_out, batch, seed, points=config.points)(0)
+    feed = batch_stream(clouds, batch, seed, points=config.points)
     folder = Path("pose") / folder_name(name, method, labels) if out is None else out
     with output.Progress("steps") as progress:
 
@@ -82,8 +86,8 @@ def train_pose(
             progress.update(int(row["step"]) + 1, steps, f"loss {row['loss']:.3f}{error}")
 
         model = train(
-            batch_stream(clouds, batch, seed, points=chosen.points),
-            chosen.configured(clouds),
+            feed,
+            config,
             replace(chosen.training, steps=steps, seed=seed),
             folder,
             build=chosen.build,
@@ -91,6 +95,8 @@ def train_pose(
             minutes=minutes,
             progress=show,
         )
+    if chosen.tuned is not None:
+        model = chosen.tuned(model, list(islice(feed(0), checks)))
     save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels))
     draw_curve(folder / CURVE_FILE, folder / CURVE_PICTURE)
     output.standard_output().print(

@@ -40,7 +40,7 @@ def asset_clouds(
     if not chosen:
         raise InputError(f"{directory}: no rigid asset of category or type {name!r}")
     rendered = joblib.Parallel(n_jobs=jobs)(
-        joblib.delayed(_views)(asset, setting, views) for asset in chosen
+        joblib.delayed(views_of)(asset, setting, views) for asset in chosen
     )
     return [cloud for clouds in rendered for cloud in clouds]  # pyright: ignore[reportOptionalIterable, reportGeneralTypeIssues]
 
@@ -60,6 +60,11 @@ def asset_subject(asset: Asset) -> Subject:
     )
 
 
-def _views(asset: Asset, setting: ViewSetting, views: int) -> list[LabelledCloud]:
+def views_of(asset: Asset, setting: ViewSetting, views: int) -> list[LabelledCloud]:
+    """Views of one asset, the same whenever it is rendered; without things in front.
+
+    Raises:
+      InputError: Its model or a mesh cannot be read, or it cannot be seen in this setting.
+    """
     rng = np.random.default_rng(zlib.crc32(asset.name.encode()))
     return render_clouds(asset_subject(asset), setting, views, rng)

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 PAIR_FEATURES = 10
 _TINY = 1e-8
+_STRAY = 5.0  # times the median distance from the middle; a hammer's ends are at 2.5
 
 
 class Cloud(eqx.Module):
@@ -51,12 +52,11 @@ def normalised(
       normals: Unit, towards the camera.
       mask: True for points.
     """
+    points, normals, mask = _without_strays(points, normals, mask)
     rows = mask[:, None]
-    count = jnp.maximum(jnp.sum(mask), 1)
-    centre = jnp.sum(jnp.where(rows, points, 0.0), axis=0) / count
+    centre = _mean(points, mask)
     offsets = jnp.where(rows, points - centre, 0.0)
-    distances = jnp.sort(jnp.where(mask, jnp.linalg.norm(offsets, axis=-1), jnp.inf))
-    scale = jnp.maximum(distances[(count - 1) // 2], 1e-4)
+    scale = jnp.maximum(_median_distance(points, mask, centre), 1e-4)
     return Cloud(
         points=offsets / scale,
         normals=jnp.where(rows, normals, 0.0),
@@ -134,6 +134,35 @@ def random_pairs(
     a = jax.random.randint(first, (count,), 0, jnp.maximum(cloud.count, 1))
     step = jax.random.randint(second, (count,), 1, jnp.maximum(cloud.count, 2))
     return a, (a + step) % jnp.maximum(cloud.count, 1)
+
+
+def _without_strays(
+    points: Float[Array, "n 3"], normals: Float[Array, "n 3"], mask: Bool[Array, "n"]
+) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"], Bool[Array, "n"]]:
+    """The same rows, those that are far from all else among the padding.
+
+    A few points of what is behind an object would move the mean by centimetres.
+    """
+    centre, near = _mean(points, mask), mask
+    for _ in range(2):  # the first middle is off by what the strays weigh
+        offsets = jnp.linalg.norm(points - centre, axis=-1)
+        near = mask & (offsets < _STRAY * _median_distance(points, mask, centre) + _TINY)
+        centre = _mean(points, near)
+    order = jnp.argsort(~near, stable=True)
+    return points[order], normals[order], near[order]
+
+
+def _mean(points: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, "3"]:
+    total = jnp.sum(jnp.where(mask[:, None], points, 0.0), axis=0)
+    return total / jnp.maximum(jnp.sum(mask), 1)
+
+
+def _median_distance(
+    points: Float[Array, "n 3"], mask: Bool[Array, "n"], centre: Float[Array, "3"]
+) -> Float[Array, ""]:
+    """Of the points from `centre`."""
+    distances = jnp.sort(jnp.where(mask, jnp.linalg.norm(points - centre, axis=-1), jnp.inf))
+    return distances[(jnp.maximum(jnp.sum(mask), 1) - 1) // 2]
 
 
 def _unit(vectors: Float[Array, "*b 3"]) -> Float[Array, "*b 3"]:

@@ -23,12 +23,12 @@ from manipose_mj.ppf_jax.model import (
     refine,
     refine_related,
 )
-from manipose_mj.ppf_jax.network import PairVotes
+from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, PairVotes
 from manipose_mj.ppf_jax.refinement import LEVELS, Reading, faced, free_space
 from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.rotations import from_vector, to_vector
 from manipose_mj.ppf_jax.stretching import stretched
-from manipose_mj.ppf_jax.symmetry import nearest_equivalent, vote_cosines
+from manipose_mj.ppf_jax.symmetry import line_cosines, nearest_equivalent, vote_cosines
 from manipose_mj.ppf_jax.voting import Hypotheses, vote
 
 # A frame that is further off is beyond correction; only the judge learns from it [rad].
@@ -51,12 +51,12 @@ class LossConfig:
       shift: Least and most, in the cloud's units.
     """
 
-    stretch: float = 0.1
+    stretch: float = 0.2
     pairs: int = 1000
     noised: int = 3
     confused: int = 1
     own: int = 2
-    related: int = 4
+    related: int = 6
     turn: tuple[float, float] = (float(np.radians(0.3)), float(np.radians(40.0)))
     shift: tuple[float, float] = (0.005, 0.5)
 
@@ -159,16 +159,21 @@ def vote_losses(
     offset = origin - votes.start
     mu = jnp.sum(offset * votes.along, axis=-1)
     nu = jnp.sqrt(jnp.maximum(jnp.sum(offset**2, axis=-1) - mu**2, 1e-10))
-    cosines = vote_cosines(votes.along, rotation, sample.turns, sample.turn_mask)
-    truth = jnp.concatenate([mu[:, None], nu[:, None], cosines], axis=-1)
+    label = (votes.along, rotation, sample.turns, sample.turn_mask)
+    lines = votes.values.shape[1] > PAIR_OUTPUTS
+    cosines = [vote_cosines(*label), line_cosines(*label)] if lines else [vote_cosines(*label)]
+    truth = jnp.concatenate([mu[:, None], nu[:, None], *cosines], axis=-1)
     losses = jnp.abs(votes.values - truth) * jnp.exp(-votes.log_scale) + votes.log_scale
     mean = jnp.mean(losses, axis=0)
-    return {
+    parts = {
         "mu": mean[0],
         "nu": mean[1],
         "x": mean[2],
         "y": jnp.where(sample.axial, 0.0, mean[3]),
     }
+    if lines:
+        parts |= {"x_line": mean[4], "y_line": jnp.where(sample.axial, 0.0, mean[5])}
+    return parts
 
 
 def _length(vectors: Float[Array, "n 3"]) -> Float[Array, "n"]:

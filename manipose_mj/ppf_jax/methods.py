@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from manipose_mj.ppf_jax.clouds import SAMPLE_POINTS, LabelledCloud
+from manipose_mj.ppf_jax.clouds import CloudBatch, LabelledCloud
 from manipose_mj.ppf_jax.cppf import CppfLoss, CppfModel, cppf_config
-from manipose_mj.ppf_jax.cppf_voting import CppfConfig
-from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
-from manipose_mj.ppf_jax.symmetry import common_symmetry
+from manipose_mj.ppf_jax.handicap import choose_handicap
+from manipose_mj.ppf_jax.model import PoseModel
+from manipose_mj.ppf_jax.model_sizes import model_config
 from manipose_mj.ppf_jax.training import TrainingConfig
 from manipose_mj.ppf_jax.weights import MethodName
 
@@ -21,31 +21,26 @@ class Method:
 
     Attributes:
       build: Makes its model from a configuration and `rng`.
-      configured: The model's configuration for a training set.
+      configured: The model's configuration for a training set; `points` is of each cloud of a batch.
       training: Its rates and loss; steps and seed are the caller's.
-      points: Of each cloud of a batch.
       checks: Clouds of the test objects that the curve is measured on.
+      tuned: What is left to choose of a trained model on batches of training views; None for nothing.
     """
 
     build: Callable[..., Any]
     configured: Callable[[Sequence[LabelledCloud]], Any]
     training: TrainingConfig
-    points: int
     checks: int
-
-
-def _ours(clouds: Sequence[LabelledCloud]) -> ModelConfig:
-    return ModelConfig(symmetry=common_symmetry(cloud.symmetry for cloud in clouds))
+    tuned: Callable[[Any, Sequence[CloudBatch]], Any] | None = None
 
 
 METHODS: dict[MethodName, Method] = {
-    "ours": Method(PoseModel, _ours, TrainingConfig(), SAMPLE_POINTS, checks=256),
+    "ours": Method(PoseModel, model_config, TrainingConfig(), checks=256, tuned=choose_handicap),
     # On a CPU it votes for seconds over each cloud: the curve gets fewer errors, of fewer clouds.
     "cppf": Method(
         CppfModel,
         cppf_config,
         TrainingConfig(learning_rate=1e-3, loss=CppfLoss(), evaluate_every=5000),
-        CppfConfig.points,
         checks=32,
     ),
 }

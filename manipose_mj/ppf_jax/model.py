@@ -102,12 +102,16 @@ class Estimates(eqx.Module):
       extents: `(h, 3)` [m].
       confidence: `(h,)`, probability of being within 15 deg and 2 cm.
       voted: `(h, 4, 4)`, the poses before refinement, in the same order.
+      doubt: `(h,)`, how far off each is judged to be [rad]; None where nothing judges.
+      related: `(h,)`, whether it was not voted for, but may be what the best of those is mistaken for.
     """
 
     poses: Float[Array, "h 4 4"]
     extents: Float[Array, "h 3"]
     confidence: Float[Array, "h"]
     voted: Float[Array, "h 4 4"]
+    doubt: Float[Array, "h"] | None = None
+    related: Bool[Array, "h"] | None = None
 
 
 class Evidence(eqx.Module):
@@ -178,8 +182,9 @@ def estimate_cloud(
     count = len(refined.origin)
     reading = joined(reading, read(model, seen, others))
     # Judged alike, a frame that the votes led to is the better bet.
-    handicap = config.refinement.related_handicap * (np.arange(len(reading.turn)) >= count)
-    off = expected_turn(reading.logits) + handicap
+    is_related = jnp.arange(len(reading.turn)) >= count
+    doubt = expected_turn(reading.logits)
+    off = doubt + config.refinement.related_handicap * is_related
     refined, first = joined(refined, others), joined(first, kin)
     likely = jax.nn.sigmoid(reading.logits)
     poses = metric_poses(refined, cloud)
@@ -195,6 +200,8 @@ def estimate_cloud(
         extents=extents[order],
         confidence=likely[order, CONFIDENT_LEVEL],
         voted=metric_poses(first, cloud)[order],
+        doubt=doubt[order],
+        related=is_related[order],
     )
 
 

@@ -19,6 +19,7 @@ from manipose_mj.ppf_jax.features import (
 )
 
 PAIR_OUTPUTS = 4  # mu, nu, cosine to X, cosine to Y
+LINE_OUTPUTS = 2  # cosine to the line of X, to the line of Y
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class NetworkConfig:
       width: Features of a point.
       pair_width: Features of a pair.
       pair_layers: Residual layers on these.
+      lines: Whether pairs vote for the lines of X and Y as well, for objects whose ends are alike.
     """
 
     neighbours: int = 12
@@ -40,6 +42,12 @@ class NetworkConfig:
     width: int = 64
     pair_width: int = 64
     pair_layers: int = 2
+    lines: bool = False
+
+    @property
+    def outputs(self) -> int:
+        """Values that a pair votes for."""
+        return PAIR_OUTPUTS + LINE_OUTPUTS * self.lines
 
 
 class Dense(eqx.Module):
@@ -73,15 +81,15 @@ class PairVotes(eqx.Module):
     Attributes:
       start: `(p, 3)`, the first point.
       along: `(p, 3)`, unit, from the first to the second point.
-      values: `(p, 4)`: signed distance of the origin along `along` from `start` (mu), its distance
-        from the line (nu), and the cosines of `along` to the label's X and Y.
-      log_scale: `(p, 4)`, logarithm of the Laplace scale of each.
+      values: `(p, 4)` or `(p, 6)`: signed distance of the origin along `along` from `start` (mu), its
+        distance from the line (nu), the cosines of `along` to the label's X and Y, and to their lines.
+      log_scale: As many, the logarithm of the Laplace scale of each.
     """
 
     start: Float[Array, "p 3"]
     along: Float[Array, "p 3"]
-    values: Float[Array, "p 4"]
-    log_scale: Float[Array, "p 4"]
+    values: Float[Array, "p outputs"]
+    log_scale: Float[Array, "p outputs"]
 
 
 class AnchorLayer(eqx.Module):
@@ -150,7 +158,7 @@ class VotingNetwork(eqx.Module):
         self.pair_layers = tuple(
             Dense(pair, pair, rng=rng, gain=0.5) for _ in range(config.pair_layers)
         )
-        self.votes = Dense(pair, 2 * PAIR_OUTPUTS, rng=rng, gain=0.1)
+        self.votes = Dense(pair, 2 * config.outputs, rng=rng, gain=0.1)
         self.size_hidden = Dense(2 * width + 1, width, rng=rng)
         self.size = Dense(width, 3, rng=rng, gain=0.1)
 
@@ -194,15 +202,15 @@ class VotingNetwork(eqx.Module):
         )
         for layer in self.pair_layers:
             hidden = hidden + layer(jax.nn.relu(hidden))
-        raw = self.votes(jax.nn.relu(hidden))
+        raw, count = self.votes(jax.nn.relu(hidden)), self.config.outputs
         offset = cloud.points[second] - cloud.points[first]
         length = jnp.sqrt(jnp.sum(offset**2, axis=-1, keepdims=True) + 1e-8)
         return PairVotes(
             start=cloud.points[first],
             along=offset / length,
-            values=raw[:, :PAIR_OUTPUTS],
+            values=raw[:, :count],
             # Between 1 % and a few times the cloud's size: no vote is ever certain or without end.
-            log_scale=3 * jnp.tanh(raw[:, PAIR_OUTPUTS:] / 3) - 1.5,
+            log_scale=3 * jnp.tanh(raw[:, count:] / 3) - 1.5,
         )
 
     def extents(self, context: Float[Array, "context"]) -> Float[Array, "3"]:

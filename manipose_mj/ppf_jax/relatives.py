@@ -24,7 +24,8 @@ def relatives(symmetry: CommonSymmetry) -> Float[np.ndarray, "r 3 3"]:
     """Turns in the label frame, `rotation @ relative`; not the identity.
 
     An axis of revolution can be upside down, a box can have any axis for any other; everything else
-    can be upside down, back to front, or turned about X.
+    can be upside down, back to front, or turned about X, and have any axis for any other where there are
+    boxes among it.
 
     Args:
       symmetry: What makes frames equivalent.
@@ -52,8 +53,10 @@ def _members(symmetry: CommonSymmetry) -> list[Float[np.ndarray, "3 3"]]:
 def _candidates(symmetry: CommonSymmetry) -> list[Float[np.ndarray, "3 3"]]:
     if symmetry.axial:
         return [rotation_about(_Y, np.pi)]
+    axes = [np.eye(3)[:, list(order)] for order in permutations(range(3))]
+    exchanged = [each * np.linalg.det(each) for each in axes]
     if symmetry.unsigned_x and symmetry.unsigned_y:
-        exchanged = [np.eye(3)[:, list(order)] for order in permutations(range(3))]
-        return [axes * np.linalg.det(axes) for axes in exchanged]
+        return exchanged
     turns = [rotation_about(_X, 2 * np.pi * i / _TURNS) for i in range(1, _TURNS)]
-    return [rotation_about(_Y, np.pi), rotation_about(_Z, np.pi), *turns]
+    turns = [rotation_about(_Y, np.pi), rotation_about(_Z, np.pi), *turns]
+    return turns + exchanged if symmetry.boxes else turns

@@ -18,6 +18,9 @@ from jaxtyping import Array, Bool, Float
 
 from manipose_mj.poses import SymmetryGroup, rotation_angle
 
+_HALF_TURNS = np.array(
+    [np.diag(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))], np.float32
+)
 _Y_AFTER_X = 1e-3  # weight of Y in the choice: decides only between frames of one X
 
 
@@ -29,38 +32,34 @@ class CommonSymmetry:
       axial: X is an axis of revolution.
       unsigned_x: Some symmetry maps X onto -X.
       unsigned_y: Some symmetry maps Y onto -Y and leaves X.
+      boxes: Not of every object, but of some: all three half turns are symmetries.
     """
 
     axial: bool = False
     unsigned_x: bool = False
     unsigned_y: bool = False
+    boxes: bool = False
 
 
 def common_symmetry(groups: Iterable[SymmetryGroup]) -> CommonSymmetry:
     """What the symmetry groups of a training set share."""
     known = list(groups)
-
-    def shared(wanted: Float[np.ndarray, "k 3"]) -> bool:
-        """Whether each group has a member that maps the first axes onto these, up to sign."""
-        count = len(wanted)
-        return all(
-            bool(
-                np.any(
-                    np.all(
-                        np.abs(g.rotations[:, :, :count].swapaxes(1, 2) - wanted) < 1e-3,
-                        axis=(1, 2),
-                    )
-                )
-            )
-            for g in known
-        )
-
     x, y = np.eye(3)[:2]
+    unsigned_x = [_maps(group, np.stack([-x])) for group in known]
+    unsigned_y = [_maps(group, np.stack([x, -y])) for group in known]
+    boxes = [a and b for a, b in zip(unsigned_x, unsigned_y, strict=True)]
     return CommonSymmetry(
         axial=bool(known) and all(g.axial for g in known),
-        unsigned_x=bool(known) and shared(np.stack([-x])),
-        unsigned_y=bool(known) and shared(np.stack([x, -y])),
+        unsigned_x=bool(known) and all(unsigned_x),
+        unsigned_y=bool(known) and all(unsigned_y),
+        boxes=any(boxes) and not all(boxes),
     )
+
+
+def _maps(group: SymmetryGroup, wanted: Float[np.ndarray, "k 3"]) -> bool:
+    """Whether a member maps the first axes onto these, up to sign."""
+    axes = np.abs(group.rotations[:, :, : len(wanted)].swapaxes(1, 2) - wanted)
+    return bool(np.any(np.all(axes < 1e-3, axis=(1, 2))))
 
 
 def vote_cosines(
@@ -81,6 +80,21 @@ def vote_cosines(
     rank = jnp.where(turn_mask, cosines[..., 0] + _Y_AFTER_X * cosines[..., 1], -jnp.inf)
     best = jnp.argmax(rank, axis=1)
     return jnp.take_along_axis(cosines, best[:, None, None], axis=1)[:, 0]
+
+
+def line_cosines(
+    along: Float[Array, "p 3"],
+    rotation: Float[Array, "3 3"],
+    turns: Float[Array, "k 3 3"],
+    turn_mask: Bool[Array, "k"],
+) -> Float[Array, "p 2"]:
+    """The cosines of each pair to the lines of X and Y: `vote_cosines` if either end were X, and Y.
+
+    They can be known where the ends cannot. Arguments as of `vote_cosines`.
+    """
+    flips = jnp.asarray(_HALF_TURNS)
+    doubled = (turns[:, None] @ flips).reshape(-1, 3, 3)
+    return vote_cosines(along, rotation, doubled, jnp.repeat(turn_mask, len(flips)))
 
 
 def nearest_equivalent(

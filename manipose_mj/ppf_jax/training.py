@@ -188,6 +188,11 @@ def evaluate(model: EstimatingModel, batches: Sequence[CloudBatch]) -> Row:
     }
 
 
+def hypothesis_degrees(found: Estimates, batch: CloudBatch) -> Float[np.ndarray, "b h"]:
+    """How far each hypothesis of each cloud is turned from the nearest equivalent label."""
+    return np.asarray(_errors(found, batch)[0])
+
+
 @jax.jit
 def _errors(found: Estimates, batch: CloudBatch) -> tuple[Array, Array, Array, Array]:
     """Degrees of every hypothesis, metres and degrees before refinement of the first, confidence."""

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from manipose_mj.ppf_jax.network import PairVotes
+from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, PairVotes
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 
 _RIDGE = 1e-4  # keeps a solve regular when all pairs lie in one plane
@@ -63,11 +63,12 @@ class Hypotheses(eqx.Module):
 
 
 class _Linear(NamedTuple):
-    """Votes `direction . unknown = value`, and how certain each is (1 / scale^2)."""
+    """Votes `direction . unknown = value`, how certain each is (1 / scale^2), and whether up to sign."""
 
     direction: Float[Array, "p 3"]
     value: Float[Array, "p"]
     certainty: Float[Array, "p"]
+    unsigned: bool
 
 
 def fibonacci_sphere(count: int) -> Float[np.ndarray, "count 3"]:
@@ -88,14 +89,13 @@ def vote(votes: PairVotes, symmetry: CommonSymmetry, config: VotingConfig) -> Hy
       symmetry: What all objects of the network's training share.
       config: How to count.
     """
-    x_votes, y_votes = _cosine_votes(votes, 2), _cosine_votes(votes, 3)
+    x_votes = _cosine_votes(votes, 2, symmetry.unsigned_x)
+    y_votes = _cosine_votes(votes, 3, symmetry.unsigned_y)
     few_x, few_y = (_first(v, config.coarse_votes) for v in (x_votes, y_votes))
     sphere = jnp.asarray(fibonacci_sphere(config.directions), votes.values.dtype)
-    scores = _direction_scores(few_x, sphere, symmetry.unsigned_x)
+    scores = _direction_scores(few_x, sphere)
     peaks = _peaks(scores, sphere, config.axes_kept, config.separation, symmetry.unsigned_x)
-    x_axes = jax.vmap(
-        lambda start: _polished_direction(x_votes, start, symmetry.unsigned_x, config.polishing)
-    )(peaks)
+    x_axes = jax.vmap(lambda start: _polished_direction(x_votes, start, config.polishing))(peaks)
     if symmetry.axial:
         y_axes = jax.vmap(_any_perpendicular)(x_axes)[:, None]
     else:
@@ -118,30 +118,43 @@ def agreement(
     cosines = jnp.einsum("pi,hij->hpj", votes.along, hypothesis.rotation[:, :, :2])
     x = jnp.abs(cosines[..., 0]) if symmetry.unsigned_x else cosines[..., 0]
     y = jnp.abs(cosines[..., 1]) if symmetry.unsigned_y else cosines[..., 1]
-    residual = jnp.stack([mu, nu, x, y], axis=-1) - votes.values
-    weight = jnp.exp(-2 * votes.log_scale)
-    kept = weight / (1 + (residual / jnp.exp(votes.log_scale)) ** 2)
+    residual = jnp.stack([mu, nu, x, y], axis=-1) - votes.values[:, :PAIR_OUTPUTS]
+    log_scale = votes.log_scale[:, :PAIR_OUTPUTS]
+    weight = jnp.exp(-2 * log_scale)
+    kept = weight / (1 + (residual / jnp.exp(log_scale)) ** 2)
     return jnp.sum(kept, axis=1) / jnp.sum(weight, axis=0)
 
 
-def _cosine_votes(votes: PairVotes, column: int) -> _Linear:
-    certainty = jnp.exp(-2 * votes.log_scale[:, column])
-    return _Linear(votes.along, votes.values[:, column], certainty)
+def _cosine_votes(votes: PairVotes, column: int, unsigned: bool) -> list[_Linear]:
+    """The votes for an axis, and those for its line if there are any."""
+
+    def of(column: int, unsigned: bool) -> _Linear:
+        certainty = jnp.exp(-2 * votes.log_scale[:, column])
+        return _Linear(votes.along, votes.values[:, column], certainty, unsigned)
+
+    if votes.values.shape[1] == PAIR_OUTPUTS:
+        return [of(column, unsigned)]
+    return [of(column, unsigned), of(column + 2, True)]
 
 
-def _first(votes: _Linear, count: int) -> _Linear:
-    return _Linear(*(leaf[:count] for leaf in votes))
+def _first(votes: list[_Linear], count: int) -> list[_Linear]:
+    return [
+        _Linear(v.direction[:count], v.value[:count], v.certainty[:count], v.unsigned)
+        for v in votes
+    ]
 
 
-def _direction_scores(
-    votes: _Linear, candidates: Float[Array, "c 3"], unsigned: bool
-) -> Float[Array, "c"]:
+def _direction_scores(votes: list[_Linear], candidates: Float[Array, "c 3"]) -> Float[Array, "c"]:
     """How well each candidate satisfies the votes, blurred to the candidates' spacing."""
-    cosine = votes.direction @ candidates.T
-    residual = (jnp.abs(cosine) if unsigned else cosine) - votes.value[:, None]
-    spread = 1 / votes.certainty + 4 * jnp.pi / len(candidates) / 4
-    kernel = 1 / (1 + residual**2 / spread[:, None])
-    return votes.certainty @ kernel
+
+    def of(votes: _Linear) -> Array:
+        cosine = votes.direction @ candidates.T
+        residual = (jnp.abs(cosine) if votes.unsigned else cosine) - votes.value[:, None]
+        spread = 1 / votes.certainty + 4 * jnp.pi / len(candidates) / 4
+        kernel = 1 / (1 + residual**2 / spread[:, None])
+        return votes.certainty @ kernel
+
+    return sum((of(kind) for kind in votes[1:]), start=of(votes[0]))
 
 
 def _peaks(
@@ -163,15 +176,21 @@ def _peaks(
 
 
 def _polished_direction(
-    votes: _Linear, start: Float[Array, "3"], unsigned: bool, rounds: int
+    votes: list[_Linear], start: Float[Array, "3"], rounds: int
 ) -> Float[Array, "3"]:
     """The direction near `start` that the votes around it agree on."""
+    direction, certainty = (jnp.concatenate([v[i] for v in votes]) for i in (0, 2))
 
     def refine(_: int, axis: Array) -> Array:
-        cosine = votes.direction @ axis
-        value = jnp.where(cosine < 0, -votes.value, votes.value) if unsigned else votes.value
-        weight = _cauchy(votes.certainty, cosine - value)
-        solved = _solve(votes.direction, value, weight, axis)
+        cosine = direction @ axis
+        value = jnp.concatenate(
+            [
+                jnp.where(v.direction @ axis < 0, -v.value, v.value) if v.unsigned else v.value
+                for v in votes
+            ]
+        )
+        weight = _cauchy(certainty, cosine - value)
+        solved = _solve(direction, value, weight, axis)
         return _unit(solved, axis)
 
     return jax.lax.fori_loop(0, rounds, refine, start)
@@ -179,8 +198,8 @@ def _polished_direction(
 
 def _turns_about(
     x: Float[Array, "3"],
-    few: _Linear,
-    votes: _Linear,
+    few: list[_Linear],
+    votes: list[_Linear],
     symmetry: CommonSymmetry,
     config: VotingConfig,
 ) -> Float[Array, "turns 3"]:
@@ -188,11 +207,11 @@ def _turns_about(
     first = _any_perpendicular(x)
     angles = jnp.arange(config.turns)[:, None] * (2 * np.pi / config.turns)
     circle = jnp.cos(angles) * first + jnp.sin(angles) * jnp.cross(x, first)
-    scores = _direction_scores(few, circle, symmetry.unsigned_y)
+    scores = _direction_scores(few, circle)
     starts = _peaks(scores, circle, config.turns_kept, config.separation, symmetry.unsigned_y)
 
     def polished(start: Array) -> Array:
-        y = _polished_direction(votes, start, symmetry.unsigned_y, config.polishing)
+        y = _polished_direction(votes, start, config.polishing)
         return _unit(y - (y @ x) * x, start)
 
     return jax.vmap(polished)(starts)

@@ -48,6 +48,19 @@ def test_turning_the_scene_about_the_camera_changes_nothing(cloud, quaternion):
     assert np.allclose(turned[off_diagonal], _all_edges(*cloud)[off_diagonal], atol=2e-3)
 
 
+def test_strays_of_the_background_are_left_out(cloud):
+    points, normals, mask = (leaf.copy() for leaf in cloud)
+    strays = [3, 17]
+    points[strays] += [0.0, 0.1, 0.9]  # a wall, seen beside the object
+    seen = normalised(points, normals, mask)
+    clean = normalised(*(np.delete(leaf, strays, axis=0) for leaf in (points, normals, mask)))
+    assert int(seen.count) == REAL - 2
+    assert np.all(np.asarray(seen.mask)[: REAL - 2])  # points first, padding last
+    np.testing.assert_allclose(seen.centre, clean.centre, atol=1e-6)
+    np.testing.assert_allclose(seen.points[: REAL - 2], clean.points[: REAL - 2], atol=1e-4)
+    np.testing.assert_allclose(seen.normals[REAL - 2 :], 0.0)
+
+
 def test_features_do_not_depend_on_size(cloud):
     points, normals, mask = cloud
     off_diagonal = ~np.eye(REAL, dtype=bool)

@@ -12,6 +12,7 @@ from manipose_mj.ppf_jax.network import PairVotes
 from manipose_mj.ppf_jax.symmetry import (
     CommonSymmetry,
     common_symmetry,
+    line_cosines,
     nearest_equivalent,
     vote_cosines,
 )
@@ -24,7 +25,7 @@ CONFIG = VotingConfig()
 voted = jax.jit(vote, static_argnums=(1, 2))
 
 
-def _votes(group=None, *, liars=0.0, noise=0.0, seed=0):
+def _votes(group=None, *, liars=0.0, noise=0.0, seed=0, lines=False):
     """Honest votes for the label, a share of which is replaced by others with the same certainty."""
     rng = np.random.default_rng(seed)
     start, end = rng.normal(size=(2, COUNT, 3))
@@ -32,14 +33,15 @@ def _votes(group=None, *, liars=0.0, noise=0.0, seed=0):
     mu = np.sum((ORIGIN - start) * along, axis=1)
     nu = np.linalg.norm(ORIGIN - start - mu[:, None] * along, axis=1)
     turns = (group or SymmetryGroup.identity()).rotations
-    cosines = vote_cosines(
-        jnp.asarray(along), jnp.asarray(ROTATION), jnp.asarray(turns), jnp.ones(len(turns), bool)
-    )
-    values = np.column_stack([mu, nu, np.asarray(cosines)])
+    label = (along, ROTATION, turns, np.ones(len(turns), bool))
+    cosines = [vote_cosines(*map(jnp.asarray, label))]
+    if lines:
+        cosines.append(line_cosines(*map(jnp.asarray, label)))
+    values = np.column_stack([mu, nu, *map(np.asarray, cosines)])
     values += noise * rng.normal(size=values.shape)
     lying = rng.random(COUNT) < liars
-    values[lying] = rng.uniform(-1, 1, size=(lying.sum(), 4))
-    log_scale = np.full((COUNT, 4), np.log(max(noise, 0.02)))
+    values[lying] = rng.uniform(-1, 1, size=(lying.sum(), values.shape[1]))
+    log_scale = np.full(values.shape, np.log(max(noise, 0.02)))
     leaves = (start, along, values, log_scale)
     return PairVotes(*(jnp.asarray(leaf, jnp.float32) for leaf in leaves))
 
@@ -97,6 +99,37 @@ def test_two_minds_give_two_hypotheses():
     )
     x = np.asarray(voted(torn, CommonSymmetry(), CONFIG).rotation)[:, :, 0] @ ROTATION[:, 0]
     assert x[0] > 0.999 and x.min() < -0.999
+
+
+def test_where_the_ends_are_unknown_the_lines_still_give_the_axes():
+    votes = _votes(noise=0.03, lines=True)
+    blind = votes.values.at[:, 2:4].set(0.0)
+    unsure = votes.log_scale.at[:, 2:4].set(0.0)
+    found = voted(PairVotes(votes.start, votes.along, blind, unsure), CommonSymmetry(), CONFIG)
+    x = np.asarray(found.rotation)[:, :, 0] @ ROTATION[:, 0]
+    assert x[0] ** 2 > 0.999 and {-1, 1} <= set(np.sign(x[np.abs(x) > 0.999]))
+    assert _degrees(found, SymmetryGroup.three_planes()).min() < 1
+    assert _degrees(voted(_votes(noise=0.03, lines=True), CommonSymmetry(), CONFIG))[0] < 1
+
+
+def test_a_line_is_of_both_ends_and_of_all_equivalent_axes():
+    along = jnp.asarray(np.random.default_rng(0).normal(size=(50, 3)))
+    along = along / jnp.linalg.norm(along, axis=1, keepdims=True)
+    cosines = np.abs(np.asarray(along @ ROTATION))
+    one = line_cosines(along, jnp.asarray(ROTATION), jnp.eye(3)[None], jnp.ones(1, bool))
+    np.testing.assert_allclose(one, cosines[:, :2], atol=1e-6)
+    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    turns = jnp.asarray(SymmetryGroup.generated(np.stack([quarter])).rotations)
+    square = line_cosines(along, jnp.asarray(ROTATION), turns, jnp.ones(len(turns), bool))
+    np.testing.assert_allclose(square[:, 1], cosines[:, 1:].max(axis=1), atol=1e-6)
+
+
+def test_boxes_among_others_are_told():
+    mixed = common_symmetry([SymmetryGroup.three_planes(), SymmetryGroup.identity()])
+    assert mixed == CommonSymmetry(boxes=True)
+    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    tall = SymmetryGroup.generated(np.stack([quarter]))
+    assert common_symmetry([tall, SymmetryGroup.identity()]) == CommonSymmetry()
 
 
 def test_the_true_pose_satisfies_the_most_votes():

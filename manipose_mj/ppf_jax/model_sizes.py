@@ -1,0 +1,39 @@
+"""How large the networks are that learn one category, and those that learn all of a type."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.model import ModelConfig
+from manipose_mj.ppf_jax.network import NetworkConfig
+from manipose_mj.ppf_jax.refinement import RefinementConfig
+from manipose_mj.ppf_jax.symmetry import CommonSymmetry, common_symmetry
+from manipose_mj.ppf_jax.voting import VotingConfig
+
+
+def model_config(clouds: Sequence[LabelledCloud]) -> ModelConfig:
+    """The model for a training set: of one category, or of several.
+
+    Args:
+      clouds: All that is trained on.
+    """
+    symmetry = common_symmetry(cloud.symmetry for cloud in clouds)
+    if len({cloud.category for cloud in clouds}) == 1:
+        return ModelConfig(symmetry=symmetry)
+    return type_config(symmetry)
+
+
+def type_config(symmetry: CommonSymmetry) -> ModelConfig:
+    """Wider networks that see more points, and more hypotheses.
+
+    What tells two ends of a thing apart differs from category to category and is often small, such
+    as a straw; where it is hidden, votes for an end say nothing, those for the line still do.
+    """
+    return ModelConfig(
+        symmetry=symmetry,
+        network=NetworkConfig(local_width=48, width=96, pair_width=96, lines=True),
+        voting=VotingConfig(axes_kept=6),
+        refinement=RefinementConfig(widths=(96, 192), hidden=192),
+        points=384,
+    )
