@@ -21,6 +21,7 @@ import numpy as np
 
 from asset_pipeline.asset_json import read_asset
 from asset_pipeline.assets import ASSET_FILE, Asset, Provenance
+from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
 from asset_pipeline.emit import write_asset
 from asset_pipeline.finish import finish_rigid
 from asset_pipeline.labelling.label import ObjectType
@@ -31,7 +32,6 @@ from manipose_mj.errors import InputError, unknown_name
 
 log = logging.getLogger(__name__)
 
-CACHE_VARIABLE = "MANIPOSE_CACHE"
 LICENCE = "Apache-2.0"
 CODE = "code"  # in an object's provenance: the hash of what built it
 TEST_EVERY = 5  # one instance of five is a test object
@@ -274,9 +274,7 @@ def cache_folder(category: str) -> Path:
     Raises:
       InputError: There is no such category.
     """
-    root = os.environ.get(CACHE_VARIABLE)
-    home = Path(root) if root else Path.home() / ".cache" / "manipose-mj"
-    return home / "catalogue" / f"{category}-{code_hash(category)}"
+    return cache_root() / "catalogue" / f"{category}-{code_hash(category)}"
 
 
 def code_hash(category: str) -> str:

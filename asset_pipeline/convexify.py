@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 import tempfile
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -15,6 +14,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
+from asset_pipeline.cache_root import cache_root
 from asset_pipeline.geometry import Shape
 from asset_pipeline.hull_reduction import hull_parts, reduced_hull
 from asset_pipeline.repair import closed, weld
@@ -22,7 +22,6 @@ from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
 
-CACHE_VARIABLE = "MANIPOSE_CACHE"
 # Parts thinner or smaller than this take no part in any contact [m^3].
 MIN_PART_VOLUME = 1e-9
 
@@ -78,18 +77,12 @@ def convexify(
       InputError: The mesh spans no volume.
     """
     settings = settings or ConvexSettings()
-    entry = (cache or cache_folder()) / "convex" / f"{_key(mesh, settings)}.npz"
+    entry = (cache or cache_root()) / "convex" / f"{_key(mesh, settings)}.npz"
     parts = _read(entry)
     if parts is None:
         parts = _decompose(mesh, settings)
         _write(entry, parts)
     return tuple(Shape(kind="mesh", mesh=part) for part in parts)
-
-
-def cache_folder() -> Path:
-    """Where results are kept: `$MANIPOSE_CACHE`, or `~/.cache/manipose-mj`."""
-    configured = os.environ.get(CACHE_VARIABLE)
-    return Path(configured) if configured else Path.home() / ".cache" / "manipose-mj"
 
 
 @dataclass(frozen=True)

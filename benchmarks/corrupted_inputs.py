@@ -36,7 +36,7 @@ from asset_difference import difference
 from damaged_files import SOURCES, Case, cases, valid
 
 from asset_pipeline.build import build
-from asset_pipeline.convexify import CACHE_VARIABLE
+from asset_pipeline.cache_root import CACHE_VARIABLE
 from asset_pipeline.limited_call import Limits
 from manipose_mj.errors import InputError
 

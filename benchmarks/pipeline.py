@@ -33,7 +33,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from asset_pipeline.build import build
-from asset_pipeline.convexify import CACHE_VARIABLE
+from asset_pipeline.cache_root import CACHE_VARIABLE
 from asset_pipeline.repair import closed, weld
 from asset_pipeline.sources import ycb
 from manipose_mj.evaluation.statistics import machine

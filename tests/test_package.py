@@ -136,3 +136,20 @@ def test_importing_and_depth_need_no_renderer(environment):
         timeout=120,
     )
     assert ended.returncode == 0, ended.stderr
+
+
+def test_importing_the_tasks_needs_neither_jax_nor_what_cuts_scans_into_convex_parts():
+    script = """
+import sys
+import manipose_mj.suite
+loaded = {name.split('.')[0] for name in sys.modules} & {'coacd', 'jax', 'equinox', 'optax'}
+assert not loaded, loaded
+"""
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", script],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert ended.returncode == 0, ended.stderr

@@ -187,9 +187,9 @@ def _visuals() -> Finding:
 
 
 def _cache() -> Finding:
-    from asset_pipeline.convexify import CACHE_VARIABLE, cache_folder
+    from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
 
-    folder = cache_folder()
+    folder = cache_root()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder):

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from asset_pipeline.assets import Asset
-from asset_pipeline.convexify import cache_folder
+from asset_pipeline.cache_root import cache_root
 from asset_pipeline.source_hash import source_hash
 from manipose_mj.tasks.pile import Pile, PileConfig, settle
 
@@ -33,7 +33,7 @@ class PileCache:
     def __init__(self, assets: Sequence[Asset], config: PileConfig) -> None:
         self._assets = tuple(assets)
         self._config = config
-        self._folder = cache_folder() / "piles" / _key(self._assets, config)
+        self._folder = cache_root() / "piles" / _key(self._assets, config)
         self._piles: dict[int, Pile] = {}
 
     def pile(self, number: int) -> Pile:
