@@ -1,4 +1,4 @@
-"""Writing and reading `asset.json` and `grasps.json`."""
+"""Writing and reading what an asset folder says of its asset: `asset.json` and `grasps.json`."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from asset_pipeline.assets import (
     Area,
     Asset,
     Cavity,
-    GraspSet,
     MovingPart,
     Provenance,
     StablePose,
 )
 from asset_pipeline.geometry import Joint, MassProperties
+from asset_pipeline.grasps_json import read_grasps, write_grasps
 from asset_pipeline.json_fields import (
     array,
     number,
@@ -29,23 +29,11 @@ from asset_pipeline.json_fields import (
     rounded,
     typed,
     unit_quaternion,
-    write_columns,
     write_json,
 )
-from asset_pipeline.labelling.label import (
-    OBJECT_TYPES,
-    PoseLabel,
-    symmetry_from_bop,
-    symmetry_to_bop,
-)
-from asset_pipeline.labelling.label_quality import LabelQuality
+from asset_pipeline.label_json import label_to_json, quality_to_json, read_label, read_quality
 from manipose_mj.errors import InputError
-from manipose_mj.poses import (
-    pose_to_vector,
-    quaternion_to_rotation,
-    rotation_to_quaternion,
-    vector_to_pose,
-)
+from manipose_mj.poses import quaternion_to_rotation, rotation_to_quaternion
 
 
 def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
@@ -60,8 +48,8 @@ def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
         "category": asset.category,
         "units": {"length": "m", "mass": "kg", "angle": "rad"},
         "up": rounded(asset.up),
-        "label": _label_to_json(asset.label),
-        "label_quality": _quality_to_json(asset.label_quality),
+        "label": label_to_json(asset.label),
+        "label_quality": quality_to_json(asset.label_quality),
         "mass_properties": {
             "mass": float(asset.mass_properties.mass),
             "center_of_mass": rounded(asset.mass_properties.center_of_mass),
@@ -84,7 +72,7 @@ def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
     }
     write_json(asset.folder / file, document)
     if asset.grasps is not None and file == ASSET_FILE:
-        _write_grasps(asset.folder / GRASPS_FILE, asset.grasps)
+        write_grasps(asset.folder / GRASPS_FILE, asset.grasps)
 
 
 def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
@@ -127,7 +115,7 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
         name=typed(path, document, "name", str),
         kind=kind,  # pyright: ignore[reportArgumentType]
         category=typed(path, document, "category", str),
-        label=_label(path, typed(path, document, "label", dict), "label"),
+        label=read_label(path, typed(path, document, "label", dict), "label"),
         up=array(path, document, "up", (3,), "up"),
         mass_properties=properties,
         stable_poses=stable,
@@ -142,8 +130,8 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
         areas=tuple(
             _area(path, entry, i) for i, entry in enumerate(typed(path, document, "areas", list))
         ),
-        grasps=_read_grasps(folder / GRASPS_FILE, len(stable)),
-        label_quality=_quality(path, document.get("label_quality")),
+        grasps=read_grasps(folder / GRASPS_FILE, len(stable)),
+        label_quality=read_quality(path, document.get("label_quality")),
     )
 
 
@@ -160,70 +148,6 @@ def list_assets(directory: Path | str) -> list[Path]:
     if not folders:
         raise InputError(f"{directory}: holds no asset folder (none with an {ASSET_FILE})")
     return folders
-
-
-def _label_to_json(label: PoseLabel) -> dict[str, Any]:
-    return {
-        "object_type": label.object_type,
-        "origin": rounded(label.origin),
-        "rotation": rounded(label.rotation),
-        "extents": rounded(label.extents),
-        **symmetry_to_bop(label),
-    }
-
-
-def _label(path: Path, document: dict[str, Any], name: str) -> PoseLabel:
-    object_type = typed(path, document, "object_type", str, f"{name}.object_type")
-    if object_type not in OBJECT_TYPES:
-        raise InputError(
-            f"{path}: field '{name}.object_type' is {object_type!r}; "
-            f"expected one of {', '.join(OBJECT_TYPES)}"
-        )
-    rotation = array(path, document, "rotation", (3, 3), f"{name}.rotation")
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
-        raise InputError(f"{path}: field '{name}.rotation' is not a right-handed rotation matrix")
-    discrete = typed(path, document, "symmetries_discrete", list, f"{name}.symmetries_discrete")
-    continuous = typed(
-        path, document, "symmetries_continuous", list, f"{name}.symmetries_continuous"
-    )
-    try:
-        symmetry = symmetry_from_bop(rotation, discrete, continuous)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: field '{name}.symmetries_*' is wrong: {error}") from None
-    extents = array(path, document, "extents", (3,), f"{name}.extents")
-    if (extents <= 0).any():
-        raise InputError(f"{path}: field '{name}.extents' is not 3 positive lengths")
-    return PoseLabel(
-        origin=array(path, document, "origin", (3,), f"{name}.origin"),
-        rotation=rotation,
-        object_type=object_type,  # pyright: ignore[reportArgumentType]
-        extents=extents,
-        symmetry=symmetry,
-    )
-
-
-def _quality_to_json(quality: LabelQuality | None) -> dict[str, Any] | None:
-    if quality is None:
-        return None
-    residuals = {name: round(float(value), 9) for name, value in quality.residuals.items()}
-    return {"confidence": round(quality.confidence, 6), "residuals": residuals}
-
-
-def _quality(path: Path, document: Any) -> LabelQuality | None:
-    if document is None:
-        return None
-    if not isinstance(document, dict):
-        raise InputError(f"{path}: field 'label_quality' is not an object or null")
-    confidence = number(path, document, "confidence", "label_quality.confidence")
-    if not 0 <= confidence <= 1:
-        raise InputError(
-            f"{path}: field 'label_quality.confidence' is {confidence:g}; expected 0 to 1"
-        )
-    residuals = typed(path, document, "residuals", dict, "label_quality.residuals")
-    return LabelQuality(
-        confidence,
-        {key: number(path, residuals, key, f"label_quality.residuals.{key}") for key in residuals},
-    )
 
 
 def _stable_pose(path: Path, document: Any, index: int) -> StablePose:
@@ -250,7 +174,7 @@ def _part_to_json(part: MovingPart) -> dict[str, Any]:
             "frictionloss": float(joint.frictionloss),
             "damping": float(joint.damping),
         },
-        "handle": None if part.handle is None else _label_to_json(part.handle),
+        "handle": None if part.handle is None else label_to_json(part.handle),
         "cavity": None
         if cavity is None
         else {
@@ -291,7 +215,7 @@ def _part(path: Path, document: Any, index: int) -> MovingPart:
             frictionloss=number(path, joint, "frictionloss", f"{name}.joint.frictionloss"),
             damping=number(path, joint, "damping", f"{name}.joint.damping"),
         ),
-        handle=None if handle is None else _label(path, handle, f"{name}.handle"),
+        handle=None if handle is None else read_label(path, handle, f"{name}.handle"),
         cavity=None
         if cavity is None
         else Cavity(
@@ -313,45 +237,4 @@ def _area(path: Path, document: Any, index: int) -> Area:
         use=use,  # pyright: ignore[reportArgumentType]
         center=array(path, document, "center", (3,), f"{name}.center"),
         extents=array(path, document, "extents", (3,), f"{name}.extents"),
-    )
-
-
-def _write_grasps(path: Path, grasps: GraspSet) -> None:
-    """Lengths to 10 micrometres, one grasp a line: half a catalogue's size were digits nobody needs."""
-    vectors = pose_to_vector(grasps.poses) if len(grasps) else np.empty((0, 7))
-    columns = {
-        "poses": [[*np.round(v[:3], 5).tolist(), *np.round(v[3:], 6).tolist()] for v in vectors],
-        "widths": np.round(grasps.widths, 5).tolist(),
-        "clear": grasps.clear.astype(int).tolist(),
-    }
-    counts = {"held": grasps.held, "tried": grasps.tried}
-    write_columns(path, counts, columns)
-
-
-def _read_grasps(path: Path, stable_poses: int) -> GraspSet | None:
-    if not path.is_file():
-        return None
-    document = read_json(path)
-    count = len(typed(path, document, "widths", list))
-    widths = array(path, document, "widths", (count,), "widths")
-    vectors = array(path, document, "poses", (count, 7), "poses") if count else np.empty((0, 7))
-    clear = array(path, document, "clear", (count, stable_poses), "clear") if count else None
-    norms = np.linalg.norm(vectors[:, 3:], axis=1)
-    if (np.abs(norms - 1) > 1e-3).any():
-        raise InputError(f"{path}: field 'poses' is not positions and unit wxyz quaternions")
-    held, tried = document.get("held", 0), document.get("tried")
-    if tried is None:
-        held = 0
-    elif not (type(held) is type(tried) is int and 0 <= held <= min(tried, count)):
-        raise InputError(
-            f"{path}: fields 'held' and 'tried' are {held!r} and {tried!r}; expected whole numbers, "
-            f"held not above tried or the {count} grasps"
-        )
-    vectors[:, 3:] /= norms[:, None]
-    return GraspSet(
-        poses=vector_to_pose(vectors) if count else np.empty((0, 4, 4)),
-        widths=widths,
-        clear=np.empty((0, stable_poses), bool) if clear is None else clear.astype(bool),
-        held=held,
-        tried=tried,
     )
