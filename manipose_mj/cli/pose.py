@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import pose_evaluate, pose_train
+from manipose_mj.cli import pose_articulated, pose_evaluate, pose_train
 
 
 def build_app() -> SubcommandApp:
@@ -12,4 +12,6 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(name="train")(pose_train.train_pose)
     app.command(name="evaluate")(pose_evaluate.evaluate_pose)
+    app.command(name="train-articulated")(pose_articulated.train_articulated)
+    app.command(name="evaluate-articulated")(pose_articulated.evaluate_articulated)
     return app

@@ -18,10 +18,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
 from manipose_mj.ppf_jax.cppf import CppfModel
 from manipose_mj.ppf_jax.cppf_voting import CppfConfig
 from manipose_mj.ppf_jax.model import EstimatingModel, ModelConfig, PoseModel
 from manipose_mj.ppf_jax.network import NetworkConfig
+from manipose_mj.ppf_jax.part_network import PartNetworkConfig
+from manipose_mj.ppf_jax.part_voting import PartVotingConfig
 from manipose_mj.ppf_jax.refinement import RefinementConfig
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import VotingConfig
@@ -49,7 +52,7 @@ class TrainedModel:
     @property
     def method(self) -> MethodName:
         """Whose model it is."""
-        return next(name for name, (build, _) in _KINDS.items() if type(self.model) is build)
+        return next(name for name, (build, _) in _KINDS.items() if type(self.model) is build)  # pyright: ignore[reportReturnType]
 
 
 def save_weights(path: Path, trained: TrainedModel) -> None:
@@ -146,12 +149,23 @@ def _cppf_config(stored: dict[str, Any]) -> CppfConfig:
     return CppfConfig(**_tuples(stored | {"symmetry": CommonSymmetry(**stored["symmetry"])}))
 
 
+def _articulated_config(stored: dict[str, Any]) -> ArticulatedConfig:
+    own = {
+        "body": NetworkConfig(**stored["body"]),
+        "body_voting": VotingConfig(**stored["body_voting"]),
+        "network": PartNetworkConfig(**_tuples(stored["network"])),
+        "voting": PartVotingConfig(**stored["voting"]),
+    }
+    return ArticulatedConfig(**_tuples(stored | own))
+
+
 def _tuples(stored: dict[str, Any]) -> dict[str, Any]:
     """JSON's lists as the tuples they were."""
     return {k: tuple(v) if isinstance(v, list) else v for k, v in stored.items()}
 
 
-_KINDS: dict[MethodName, tuple[Callable[..., Any], Callable[[dict[str, Any]], Any]]] = {
+_KINDS: dict[str, tuple[Callable[..., Any], Callable[[dict[str, Any]], Any]]] = {
     "ours": (PoseModel, _model_config),
     "cppf": (CppfModel, _cppf_config),
+    "articulated": (ArticulatedModel, _articulated_config),
 }

@@ -1,0 +1,178 @@
+"""`manipose pose train-articulated` and `evaluate-articulated`: handles and joints of furniture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import arg
+
+from manipose_mj.cli.pose_train import CURVE_PICTURE, WEIGHTS_FILE
+from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.errors import InputError
+
+_CALIBRATION = 320  # clouds that confidence is fitted on
+
+
+def train_articulated(
+    *,
+    out: Annotated[Path, arg(metavar="DIR")] = Path("pose/articulated"),
+    scenes: int = 16,
+    further: int = 0,
+    batch: int = 32,
+    steps: int = 20_000,
+    minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
+    seed: int = 0,
+    jobs: int = CORES,
+) -> int:
+    """Train the estimator of handles and joints on rendered scenes of the catalogue's furniture.
+
+    Goes on where an interrupted training of the same folder was. Writes the weights, the state to go on
+    from and the curve, and prints what the weights reach on the catalogue's test furniture.
+
+    Args:
+      out: Folder to write to.
+      scenes: Of each object; a scene has openings of its own and four views.
+      further: Objects of each category beyond the built-in ones, to learn from more of them.
+      batch: Clouds in a step.
+      steps: In all.
+      minutes: Ends the training, cooled down, if the steps do not.
+      seed: Of the first weights and of all that training draws.
+      jobs: Processes that render.
+    """
+    one_thread_per_process()
+    for option, value in (("--scenes", scenes), ("--batch", batch), ("--steps", steps)):
+        if value < 1:
+            raise InputError(f"{option} is {value}; expected at least 1")
+    if minutes is not None and not minutes > 0:
+        raise InputError(f"--minutes is {minutes:g}; expected more than 0")
+    if further < 0:
+        raise InputError(f"--further is {further}; expected 0 or more")
+    from manipose_mj.cli import output
+    from manipose_mj.ppf_jax.articulated_cache import (
+        furniture_names,
+        furniture_scenes,
+        furniture_stream,
+    )
+    from manipose_mj.ppf_jax.articulated_evaluation import calibrated, scene_clouds
+    from manipose_mj.ppf_jax.articulated_losses import ArticulatedLoss
+    from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
+    from manipose_mj.ppf_jax.articulated_subject import CATEGORIES
+    from manipose_mj.ppf_jax.curve_picture import draw_curve
+    from manipose_mj.ppf_jax.training import CURVE_FILE, Row, TrainingConfig, train
+    from manipose_mj.ppf_jax.weights import TrainedModel, save_weights
+
+    with output.Progress("objects rendered") as progress:
+        known = furniture_scenes(
+            furniture_names("train", further),
+            "training",
+            scenes=scenes,
+            jobs=jobs,
+            progress=progress.update,
+        )
+    with output.Progress("steps") as progress:
+
+        def show(row: Row) -> None:
+            progress.update(int(row["step"]) + 1, steps, f"loss {row['loss']:.3f}")
+
+        model = train(
+            furniture_stream(known, batch, seed),  # pyright: ignore[reportArgumentType]
+            ArticulatedConfig(),
+            TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss()),  # pyright: ignore[reportArgumentType]
+            out,
+            build=ArticulatedModel,
+            minutes=minutes,
+            progress=show,
+        )
+    chosen = known[:: max(1, len(known) // _CALIBRATION)]
+    model = calibrated(model, scene_clouds(chosen, seed=seed))
+    save_weights(out / WEIGHTS_FILE, TrainedModel(model, CATEGORIES))  # pyright: ignore[reportArgumentType]
+    draw_curve(out / CURVE_FILE, out / CURVE_PICTURE)
+    output.standard_output().print(
+        f"trained on {len(known)} scenes; {out / WEIGHTS_FILE}", soft_wrap=True
+    )
+    return evaluate_articulated(weights=out / WEIGHTS_FILE, jobs=jobs)
+
+
+def evaluate_articulated(
+    *,
+    weights: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    split: Literal["train", "test"] = "test",
+    scenes: int = 8,
+    jobs: int = CORES,
+    json: bool = False,
+) -> int:
+    """Evaluate the estimator of handles and joints on rendered scenes of the catalogue's furniture.
+
+    Shares of the parts whose handle a cloud shows: handle's centre within 1.5 cm, its axes and the joint's
+    direction within 5 degrees, a hinge's axis within 2 cm, the joint's type right.
+
+    Args:
+      weights: File that manipose pose train-articulated wrote; those of the package without it.
+      split: Of the catalogue.
+      scenes: Of each object; one view of each, and all three from the front together.
+      jobs: Processes that render.
+      json: Print JSON, for other programs.
+    """
+    one_thread_per_process()
+    if scenes < 1:
+        raise InputError(f"--scenes is {scenes}; expected at least 1")
+    from rich.table import Table
+
+    from manipose_mj.cli import output
+    from manipose_mj.ppf_jax.articulated_cache import furniture_names, furniture_scenes
+    from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator
+    from manipose_mj.ppf_jax.articulated_evaluation import evaluated, scene_clouds
+    from manipose_mj.ppf_jax.articulated_metrics import summary
+
+    if weights is None:
+        estimator = ArticulatedEstimator.load()
+    else:
+        estimator = ArticulatedEstimator.from_file(weights)
+    with output.Progress(f"{split} objects rendered") as progress:
+        shown = furniture_scenes(
+            furniture_names(split), "front", scenes=scenes, jobs=jobs, progress=progress.update
+        )
+    rows = []
+    for fused in (1, 3):
+        found = evaluated(estimator, scene_clouds(shown, fused=fused))
+        for category in ("all", *dict.fromkeys(scene.category for scene in shown)):
+            own = [e for e in found.errors if category == "all" or e.name.startswith(category)]
+            rows.append({"views": fused, "category": category} | summary(own, 0, found.clouds))
+        rows[-1 - len({scene.category for scene in shown})]["strange_per_cloud"] = (
+            found.strange / found.clouds
+        )
+    if json:
+        output.write_json(rows)
+        return 0
+    table = Table("views", "category", title=f"{split} furniture, parts whose handle shows")
+    shares = {
+        "found": "found",
+        "centre": "centre_within",
+        "axes": "axes_within",
+        "type": "type_right",
+        "way": "direction_within",
+        "line": "line_within",
+        "handle": "handle_right",
+        "joint": "joint_right",
+        "all": "all_right",
+    }
+    medians = {
+        "cm": "centre_cm_median",
+        "deg": "axes_deg_median",
+        "line cm": "line_cm_median",
+        "open deg": "opening_deg_median",
+        "open cm": "opening_cm_median",
+    }
+    for head in ("n", *shares, *medians):
+        table.add_column(head, justify="right")
+    for row in rows:
+        table.add_row(
+            str(row["views"]),
+            str(row["category"]),
+            str(row["n"]),
+            *(f"{row[name]:.0%}" for name in shares.values()),
+            *(f"{row[name]:.2f}" for name in medians.values()),
+        )
+    output.standard_output().print(table)
+    return 0

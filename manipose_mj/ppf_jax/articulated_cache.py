@@ -1,0 +1,196 @@
+"""Scenes of furniture, rendered once into a cache folder and streamed to training.
+
+A file holds some scenes of one object and depends on nothing but the object, the setting, the number of the
+file and the code.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import pickle
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE, Split
+from asset_pipeline.source_hash import source_hash
+from asset_pipeline.staging import staging
+from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.articulated_clouds import (
+    FurnitureBatch,
+    FurnitureCloud,
+    FurnitureScene,
+    batch_furniture,
+    fused_cloud,
+)
+from manipose_mj.ppf_jax.articulated_subject import (
+    CATEGORIES,
+    ArticulatedSubject,
+    catalogue_furniture,
+)
+from manipose_mj.ppf_jax.articulated_views import (
+    FURNITURE_SETTINGS,
+    FurnitureSetting,
+    random_openings,
+    render_furniture,
+)
+from manipose_mj.ppf_jax.view_cache import Report
+
+SCENES_PER_FILE = 4
+FRONT_VIEWS = 3  # of each scene
+FORMAT = 1  # of the files, and of how this module seeds them
+_SINGLE, _TWO = 0.7, 0.85  # shares of clouds of one view; of one or two
+
+
+def furniture_names(split: Split, further: int = 0) -> list[tuple[str, int]]:
+    """Category and index of the articulated objects in a split.
+
+    Args:
+      split: Of the catalogue.
+      further: For training, so many more of each category, beyond the built-in ones.
+    """
+    found = []
+    for category in CATEGORIES:
+        row = CATALOGUE[category]
+        found += [(category, i) for i in range(row.instances) if row.split(i) == split]
+        found += [(category, row.instances + i) for i in range(further)]
+    return found
+
+
+def furniture_scenes(
+    objects: Sequence[tuple[str, int]],
+    setting: str,
+    *,
+    scenes: int,
+    jobs: int = 1,
+    progress: Report | None = None,
+) -> list[FurnitureScene]:
+    """Scenes of catalogue objects, by object; what is missing is rendered.
+
+    Args:
+      objects: Category and index of each.
+      setting: A name in `FURNITURE_SETTINGS`.
+      scenes: Of each object.
+      jobs: Processes.
+      progress: Told of every finished object.
+
+    Raises:
+      InputError: The cache cannot be written.
+    """
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
+        joblib.delayed(_fill)(*each, setting, scenes) for each in objects
+    )
+    for done, name in enumerate(work, 1):
+        if progress is not None:
+            progress(done, len(objects), name)
+    return [scene for each in objects for scene in _read(*each, setting, scenes)]
+
+
+def random_scene(
+    subject: ArticulatedSubject, setting: FurnitureSetting, number: int, rng: np.random.Generator
+) -> FurnitureScene:
+    """One scene: `FRONT_VIEWS` views from before the front; every other one, one from anywhere around."""
+    openings = random_openings(subject, setting, rng)
+    views = [render_furniture(subject, openings, setting, rng) for _ in range(FRONT_VIEWS)]
+    if number % 2:
+        views.append(render_furniture(subject, openings, setting, rng, placement="around"))
+    return FurnitureScene(
+        name=f"{subject.name}/{number}",
+        category=subject.category,
+        label=subject.label.pose,
+        joints=subject.joints,
+        openings=openings,
+        views=tuple(views),
+    )
+
+
+def furniture_stream(
+    scenes: Sequence[FurnitureScene], batch: int, seed: int
+) -> Callable[[int], Iterator[FurnitureBatch]]:
+    """Batches of one shape without end, from any step on; each depends on the seed and its step only.
+
+    Raises:
+      InputError: There are no scenes.
+    """
+    if not scenes:
+        raise InputError("no scenes to stream; expected at least one")
+
+    def batches(start: int) -> Iterator[FurnitureBatch]:
+        for step in itertools.count(start):
+            rng = np.random.default_rng([seed, 1, step])
+            chosen = rng.integers(len(scenes), size=batch)
+            clouds = [random_cloud(scenes[i], rng) for i in chosen]
+            yield batch_furniture(clouds, rng=rng)
+
+    return batches
+
+
+def random_cloud(scene: FurnitureScene, rng: np.random.Generator) -> FurnitureCloud:
+    """The cloud of one of the front views, sometimes fused with others."""
+    first = int(rng.integers(FRONT_VIEWS))
+    others = rng.permutation([i for i in range(len(scene.views)) if i != first])
+    draw = rng.random()
+    more = 0 if draw < _SINGLE else 1 if draw < _TWO else 2
+    return fused_cloud(scene, [first, *others[:more]], rng)
+
+
+def scene_folder(setting: str) -> Path:
+    """Where scenes are kept: under `$MANIPOSE_CACHE`, else `~/.cache/manipose-mj`."""
+    root = os.environ.get(CACHE_VARIABLE)
+    home = Path(root) if root else Path.home() / ".cache" / "manipose-mj"
+    return home / "clouds" / f"furniture-{setting}-{_code_hash(setting)}"
+
+
+@cache
+def _code_hash(setting: str) -> str:
+    modules = [render_furniture.__module__, *(CATALOGUE[c].module for c in CATEGORIES)]
+    values = repr(FURNITURE_SETTINGS[setting])
+    return source_hash(modules, values, version("numpy"), str(FORMAT))
+
+
+def _files(category: str, index: int, setting: str, scenes: int) -> list[Path]:
+    name = CATALOGUE[category].instance(index)
+    count = -(-scenes // SCENES_PER_FILE)
+    return [scene_folder(setting) / f"{name}-{i:03d}.pickle" for i in range(count)]
+
+
+def _fill(category: str, index: int, setting: str, scenes: int) -> str:
+    """Render what is missing of one object; returns its name."""
+    files = _files(category, index, setting, scenes)
+    missing = [number for number, path in enumerate(files) if not path.is_file()]
+    if missing:
+        subject = catalogue_furniture(category, index)
+        for number in missing:
+            rng = np.random.default_rng([zlib.crc32(subject.name.encode()), number])
+            first = number * SCENES_PER_FILE
+            rendered = [
+                random_scene(subject, FURNITURE_SETTINGS[setting], first + i, rng)
+                for i in range(SCENES_PER_FILE)
+            ]
+            _write(files[number], rendered)
+    return CATALOGUE[category].instance(index)
+
+
+def _write(path: Path, scenes: Sequence[FurnitureScene]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with staging(path) as scratch:
+            (scratch / path.name).write_bytes(pickle.dumps(list(scenes)))
+            os.replace(scratch / path.name, path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
+            f"set {CACHE_VARIABLE} to a folder with room that can be written"
+        ) from None
+
+
+def _read(category: str, index: int, setting: str, scenes: int) -> list[FurnitureScene]:
+    # Our own cache, written by `_write`.
+    read = [pickle.loads(p.read_bytes()) for p in _files(category, index, setting, scenes)]
+    return [scene for some in read for scene in some][:scenes]

@@ -1,0 +1,236 @@
+"""The estimator of handles and joints as one pytree, and what it does to one cloud."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from manipose_mj.poses import compose
+from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
+from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned
+from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
+from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
+from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
+from manipose_mj.ppf_jax.part_voting import (
+    EVIDENCE,
+    Parts,
+    PartVotingConfig,
+    find_parts,
+    frame_turn,
+    unit,
+)
+from manipose_mj.ppf_jax.rotations import from_vector
+from manipose_mj.ppf_jax.voting import VotingConfig, vote
+
+
+@dataclass(frozen=True)
+class ArticulatedConfig:
+    """All that fixes the model's shape and how it is run.
+
+    Attributes:
+      body: Sizes of the network whose pairs vote for the frame of the body.
+      body_voting: How these votes are counted.
+      body_points: Points that it looks at.
+      body_pairs: Votes at inference.
+      network: Sizes of the part network.
+      voting: How its votes are counted.
+      points: Points that it looks at.
+      focus: How near to a supposed handle points are looked at more closely the second time [m].
+    """
+
+    body: NetworkConfig = field(default_factory=lambda: NetworkConfig(anchors=32))
+    body_voting: VotingConfig = field(default_factory=VotingConfig)
+    body_points: int = 512
+    body_pairs: int = 4096
+    network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
+    voting: PartVotingConfig = field(default_factory=PartVotingConfig)
+    points: int = BATCH_POINTS
+    focus: float = 0.06
+
+
+class PartEstimates(eqx.Module):
+    """Handles and joints in the camera frame; a row is a part, the surest first.
+
+    Attributes:
+      handle: `(k, 4, 4)`, `T_camera_handle`.
+      hinge: `(k,)`, probability of turning; else the part slides.
+      axis_origin: `(k, 3)` [m], on the joint's axis.
+      axis: `(k, 3)`, unit; positive is opening.
+      opening: `(k,)` [m or rad].
+      evidence: `(k, EVIDENCE)`, as of `Parts`.
+      confidence: `(k,)`, probability of the estimate being right in all.
+      body: `(3, 3)`, columns are out of the front, up or down, and sideways.
+    """
+
+    handle: Float[Array, "k 4 4"]
+    hinge: Float[Array, "k"]
+    axis_origin: Float[Array, "k 3"]
+    axis: Float[Array, "k 3"]
+    opening: Float[Array, "k"]
+    evidence: Float[Array, "k evidence"]
+    confidence: Float[Array, "k"]
+    body: Float[Array, "3 3"]
+
+
+class ArticulatedModel(eqx.Module):
+    """The network of the body's frame, that of the parts, and what makes evidence a confidence.
+
+    Attributes:
+      body: Its pairs vote for the frame of the body.
+      parts: Its points vote for the parts.
+      calibration: `(1 + EVIDENCE,)`, of a logistic regression; fitted when the rest is trained.
+    """
+
+    body: VotingNetwork
+    parts: PartNetwork
+    calibration: Float[Array, "weights"]
+    config: ArticulatedConfig = eqx.field(static=True)
+
+    def __init__(self, config: ArticulatedConfig, *, rng: np.random.Generator):
+        self.body = VotingNetwork(config.body, rng=rng)
+        self.parts = PartNetwork(config.network, rng=rng)
+        self.calibration = jnp.zeros(1 + EVIDENCE).at[0].set(1.0)
+        self.config = config
+
+    def estimate(
+        self,
+        points: Float[Array, "n 3"],
+        normals: Float[Array, "n 3"],
+        mask: Bool[Array, "n"],
+        up: Float[Array, "3"],
+        *,
+        key: PRNGKeyArray,
+    ) -> PartEstimates:
+        """`estimate_parts` with this model."""
+        return estimate_parts(self, points, normals, mask, up, key=key)
+
+
+def estimate_parts(
+    model: ArticulatedModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    up: Float[Array, "3"],
+    *,
+    key: PRNGKeyArray,
+) -> PartEstimates:
+    """Vote for the body's frame, then in it for parts; look again where handles seem to be.
+
+    A pure function of one cloud: `vmap` it.
+
+    Args:
+      model: The networks.
+      points: [m], camera frame, the camera at the origin.
+      normals: Unit, towards the camera.
+      mask: True for points, false for padding.
+      up: Roughly, camera frame: decides only between a handle's two directions.
+      key: Draws the samples and the pairs.
+    """
+    config = model.config
+    body_key, first_key, second_key = jax.random.split(key, 3)
+    rotation = body_rotation(model, points, normals, mask, key=body_key)
+    order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
+    chosen = jnp.argsort(order)[: config.points]
+    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
+    votes = model.parts(cloud)
+    first = find_parts(cloud, votes, config.voting)
+    turn = from_vector(frame_turn(cloud, votes, config.voting))
+    # The second time, half of the points are from where handles seem to be.
+    own = (points - centre) @ rotation
+    apart = jnp.linalg.norm(own[:, None] - first.centre, axis=-1)
+    likely = first.score > 0.05 * jnp.max(first.score)
+    near = jnp.any((apart < config.focus) & likely, axis=1) & mask
+    again = jax.random.uniform(second_key, mask.shape) + 2.0 * ~mask
+    rank = jnp.argsort(jnp.argsort(jnp.where(near, again, 3.0 + again)))
+    again = jnp.where(near & (rank < config.points // 2), -1.0, again)
+    chosen = jnp.argsort(again)[: config.points]
+    # In random order: the first of them stand for all. Padding comes last.
+    shuffle = jax.random.uniform(second_key, chosen.shape) + 2.0 * ~mask[chosen]
+    chosen = chosen[jnp.argsort(shuffle)]
+    rotation = rotation @ turn
+    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
+    parts = find_parts(cloud, model.parts(cloud), config.voting)
+    return _in_camera(parts, rotation, centre, up, model.calibration)
+
+
+def body_rotation(
+    model: ArticulatedModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    *,
+    key: PRNGKeyArray,
+) -> Float[Array, "3 3"]:
+    """Columns: out of the front, up or down, and sideways, camera frame."""
+    config = model.config
+    sample_key, pair_key = jax.random.split(key)
+    cloud = normalised(*sampled(points, normals, mask, count=config.body_points, key=sample_key))
+    votes = body_votes(model, cloud, config.body_pairs, key=pair_key)
+    found = vote(votes, BODY_SYMMETRY, config.body_voting)
+    return aligned(found.rotation[0], points, normals, mask)
+
+
+def body_votes(
+    model: ArticulatedModel, cloud: Cloud, pairs: int, *, key: PRNGKeyArray
+) -> PairVotes:
+    """Votes of random pairs for the frame of the body."""
+    known, context = model.body.encode(cloud)
+    first, second = random_pairs(cloud, pairs, key=key)
+    return model.body.pairs(cloud, known, context, first, second)
+
+
+def body_cloud(
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    rotation: Float[Array, "3 3"],
+) -> tuple[BodyCloud, Float[Array, "3"]]:
+    """A cloud turned into the body's frame about its points' mean, and this mean (camera frame)."""
+    rows = mask[:, None]
+    centre = jnp.sum(jnp.where(rows, points, 0.0), axis=0) / jnp.maximum(jnp.sum(mask), 1)
+    own = jnp.where(rows, (points - centre) @ rotation, 0.0)
+    views = jnp.where(rows, -unit(points) @ rotation, 0.0)
+    return BodyCloud(own, jnp.where(rows, normals @ rotation, 0.0), views, mask), centre
+
+
+def _in_camera(
+    parts: Parts,
+    rotation: Float[Array, "3 3"],
+    centre: Float[Array, "3"],
+    up: Float[Array, "3"],
+    calibration: Float[Array, "weights"],
+) -> PartEstimates:
+    # Half a turn of the body about its front would turn X round: `up` says which way it is.
+    sign = jnp.where(rotation[:, 1] @ up < 0, -1.0, 1.0)
+    handle = rotation @ parts.rotation * jnp.stack([sign, jnp.ones_like(sign), sign])
+    return PartEstimates(
+        handle=compose(handle, parts.centre @ rotation.T + centre),
+        hinge=parts.hinge,
+        axis_origin=parts.line @ rotation.T + centre,
+        axis=parts.axis @ rotation.T,
+        opening=parts.opening,
+        evidence=parts.evidence,
+        confidence=jax.nn.sigmoid(calibration[0] + parts.evidence @ calibration[1:]),
+        body=rotation,
+    )
+
+
+@eqx.filter_jit
+def estimate_furniture(
+    model: ArticulatedModel,
+    points: Float[Array, "b n 3"],
+    normals: Float[Array, "b n 3"],
+    mask: Bool[Array, "b n"],
+    up: Float[Array, "b 3"],
+    *,
+    key: PRNGKeyArray,
+) -> PartEstimates:
+    """The estimates for every row of a batch, a few at a time to bound the memory."""
+    keys = jax.random.split(key, len(points))
+    rows = (jnp.asarray(points), jnp.asarray(normals), jnp.asarray(mask), jnp.asarray(up), keys)
+    return jax.lax.map(lambda row: model.estimate(*row[:4], key=row[4]), rows, batch_size=8)
