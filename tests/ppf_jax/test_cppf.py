@@ -120,4 +120,4 @@ def test_every_method_makes_a_model_that_its_weights_know(mugs):
     for name, method in METHODS.items():
         model = method.build(method.configured(mugs), rng=np.random.default_rng(0))
         assert TrainedModel(model, ("mug",)).method == name
-        assert hash(method.training) and method.points <= 1024
+        assert hash(method.training) and model.config.points <= 1024
