@@ -33,7 +33,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "asset_pipeline"))
 
 from asset_difference import difference
-from damaged_files import SOURCES, Case, cases, valid
+from damaged_files import Case, cases
+from valid_files import SOURCES, valid
 
 from asset_pipeline.build import build
 from asset_pipeline.cache_root import CACHE_VARIABLE

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damaged_files import SOURCES, Case, cases, valid
+from damaged_files import Case, cases
 from hypothesis import HealthCheck, given, settings
+from valid_files import SOURCES, valid
 
 from asset_pipeline import build as build_module
 from asset_pipeline.articulated_scan import ArticulatedScan

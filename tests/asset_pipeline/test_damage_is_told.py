@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from damaged_files import FINE, Case, scanned_box, valid
+from damaged_files import Case
 from trimesh.exchange.ply import export_ply
+from valid_files import FINE, scanned_box, valid
 
 from asset_pipeline.build import SOURCES
 from asset_pipeline.repair import drop_flaps, spikes

@@ -1,20 +1,18 @@
-"""Fetching from a local server: whole, cut, changed, refused, hostile; nothing leaves the machine."""
+"""Fetching data sets from a local server: by list, with a record, hostile names; nothing leaves the machine."""
+
+from __future__ import annotations
 
 import hashlib
 import json
 import os
-import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
 
-import numpy as np
 import pytest
 import scan_files as files
+from scan_site import Site, archive, tree
 
-from asset_pipeline import download as download_module
 from asset_pipeline.build import SOURCES
-from asset_pipeline.download import DownloadSettings, download
+from asset_pipeline.download import DownloadSettings
 from asset_pipeline.fetch import fetch, read_checksums
 from asset_pipeline.fetch_record import RECORD
 from asset_pipeline.publishers import PUBLISHERS
@@ -31,247 +29,8 @@ YCB_REAL = (
 )
 
 
-class Site:
-    """What the server has and how it misbehaves.
-
-    Attributes:
-      files: By path.
-      cut: Bytes after which it hangs up, one number a request; None for all.
-      tagged: Whether it says which version a file is.
-      ranges: Whether it honours `Range`.
-      stubborn: It sends a part of the new file where `If-Range` names the old one.
-      errors: Status codes to answer with first.
-      asked: Method, path and `Range` of what was asked for.
-    """
-
-    def __init__(self) -> None:
-        self.files: dict[str, bytes] = {}
-        self.cut: list[int | None] = []
-        self.errors: list[int] = []
-        self.tagged = self.ranges = True
-        self.stubborn = self.silent = False
-        self.asked: list[tuple[str, str | None]] = []
-
-    def tag(self, path: str) -> str:
-        return f'"{hashlib.md5(self.files[path]).hexdigest()}"'
-
-
-class Handler(BaseHTTPRequestHandler):
-    site: Site
-
-    def do_GET(self) -> None:
-        site, path = self.site, unquote(urlsplit(self.path).path)
-        site.asked.append((self.path, self.headers.get("Range")))
-        if site.errors:
-            self.send_error(site.errors.pop(0))
-            return
-        if path not in site.files:
-            self.send_error(404)
-            return
-        body, start = site.files[path], 0
-        wanted = self.headers.get("Range")
-        same = self.headers.get("If-Range") in (None, site.tag(path)) or site.stubborn
-        if wanted and site.ranges and same:
-            start = int(wanted.removeprefix("bytes=").rstrip("-"))
-            if start >= len(body):
-                self.send_error(416)
-                return
-        self.send_response(206 if start else 200)
-        if start:
-            self.send_header("Content-Range", f"bytes {start}-{len(body) - 1}/{len(body)}")
-        if not site.silent:
-            self.send_header("Content-Length", str(len(body) - start))
-        if site.tagged:
-            self.send_header("ETag", site.tag(path))
-        self.end_headers()
-        cut = site.cut.pop(0) if site.cut else None
-        self.wfile.write(body[start:] if cut is None else body[start : start + cut])
-        self.close_connection = True
-
-    def log_message(self, *_: object) -> None:
-        pass
-
-
-@pytest.fixture
-def server():
-    site = Site()
-    handler = type("SiteHandler", (Handler,), {"site": site})
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as http:
-        thread = threading.Thread(target=http.serve_forever, args=(0.02,), daemon=True)
-        thread.start()
-        site.url = f"http://127.0.0.1:{http.server_port}"
-        yield site
-        http.shutdown()
-        thread.join()
-
-
-def _archive(folder: Path, seed: int = 0, ending: str = "tgz", size: int = 400_000) -> bytes:
-    """A scan's archive, of noise so that it stays large."""
-    noise = np.random.default_rng(seed).bytes(size)
-    path = folder / f"made-{seed}.{ending}"
-    content = {"037_scissors/google_16k/textured.obj": files.obj(files.box((0.1, 0.1, 0.1)))}
-    data = files.write_archive(path, content | {"noise": noise}).read_bytes()
-    path.unlink()
-    return data
-
-
-def _tree(folder: Path) -> set[str]:
-    return {str(p.relative_to(folder)) for p in folder.rglob("*")}
-
-
-def _get(server: Site, target: Path, **more) -> str:
-    return download(f"{server.url}/a.tgz", target, settings=QUICK, **more)
-
-
-@pytest.fixture
-def target(tmp_path):
-    (tmp_path / "out").mkdir()
-    return tmp_path / "out" / "a.tgz"
-
-
-def test_whole_file_in_one_go(server, target, tmp_path):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    seen = []
-    got = _get(server, target, progress=lambda done, total: seen.append((done, total)))
-    assert target.read_bytes() == data and got == hashlib.sha256(data).hexdigest()
-    assert seen[-1] == (len(data), len(data)) and len(seen) > 1
-    assert _tree(target.parent) == {"a.tgz"} and len(server.asked) == 1
-
-
-@pytest.mark.parametrize("ending", ["tgz", "zip"])
-def test_cut_connections_are_taken_up_where_they_broke(server, target, tmp_path, ending):
-    server.files["/a.tgz"] = data = _archive(tmp_path, ending=ending)
-    server.cut = [100_000, 50_000, None]
-    _get(server, target)
-    assert target.read_bytes() == data
-    ranges = [r for _, r in server.asked]
-    assert ranges == [None, "bytes=100000-", "bytes=150000-"]
-
-
-def test_a_later_run_goes_on(server, target, tmp_path):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    server.cut = [100_000, 0, 0, 0]
-    with pytest.raises(InputError, match="100000 bytes are kept, run again to go on"):
-        _get(server, target)
-    assert _tree(target.parent) == {"a.tgz.part", "a.tgz.part.json"}
-    server.asked.clear()
-    _get(server, target)
-    assert target.read_bytes() == data and server.asked == [("/a.tgz", "bytes=100000-")]
-
-
-def test_interruption_leaves_no_file_under_the_final_name(server, target, tmp_path):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    server.cut = [300_000, None]  # or the whole file may be there before the interruption
-
-    def interrupt(done: int, _: int | None) -> None:
-        if done > 200_000:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        _get(server, target, progress=interrupt)
-    assert _tree(target.parent) == {"a.tgz.part", "a.tgz.part.json"}
-    _get(server, target)
-    assert target.read_bytes() == data and server.asked[-1][1] is not None
-
-
-@pytest.mark.parametrize("stubborn", [False, True])
-def test_file_that_changed_on_the_server_starts_again(server, target, tmp_path, stubborn):
-    server.files["/a.tgz"] = _archive(tmp_path)
-    server.cut = [100_000, 0, 0, 0]
-    with pytest.raises(InputError):
-        _get(server, target)
-    server.files["/a.tgz"] = data = _archive(tmp_path, seed=1, size=500_000)
-    server.stubborn = stubborn
-    _get(server, target)
-    assert target.read_bytes() == data
-
-
-@pytest.mark.parametrize("trouble", ["untagged", "no ranges"])
-def test_server_that_cannot_resume(server, target, tmp_path, trouble):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    server.cut = [100_000, None]
-    server.tagged = trouble != "untagged"
-    server.ranges = trouble != "no ranges"
-    _get(server, target)
-    assert target.read_bytes() == data
-    assert server.asked[1][1] == (None if trouble == "untagged" else "bytes=100000-")
-
-
-def test_server_that_does_not_say_how_much_comes(server, target, tmp_path):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    server.silent = True
-    _get(server, target)
-    assert target.read_bytes() == data
-    target.unlink()
-    server.cut = [len(data) // 2]
-    with pytest.raises(InputError, match="truncated"):
-        _get(server, target)
-    assert not _tree(target.parent)
-
-
-def test_complete_part_is_not_fetched_again(server, target, tmp_path, monkeypatch):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    with monkeypatch.context() as patch:
-        patch.setattr(download_module, "sha256", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            _get(server, target)
-    _get(server, target)
-    assert target.read_bytes() == data and len(server.asked) == 1
-
-
-def test_passing_errors_are_waited_for_and_lasting_ones_named(server, target, tmp_path):
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    server.errors = [503, 429]
-    _get(server, target)
-    assert target.read_bytes() == data
-    target.unlink()
-    server.errors = [503] * 9
-    with pytest.raises(InputError, match="cannot be downloaded .HTTP 503"):
-        _get(server, target)
-    server.errors = [403]
-    with pytest.raises(InputError, match="refused .HTTP 403"):
-        _get(server, target)
-    assert not _tree(target.parent)
-
-
-def test_what_is_no_archive_or_another_file_is_not_kept(server, target, tmp_path):
-    server.files["/a.tgz"] = b"<html>please log in</html>" * 100
-    with pytest.raises(InputError, match="truncated, or not a zip"):
-        _get(server, target)
-    server.files["/a.tgz"] = data = _archive(tmp_path)
-    with pytest.raises(InputError, match="expected " + "0" * 64):
-        _get(server, target, digest="0" * 64)
-    assert not _tree(target.parent)
-    _get(server, target, digest=hashlib.sha256(data).hexdigest().upper())
-
-
-@pytest.mark.parametrize("url", ["file:///etc/passwd", "ftp://x/a.tgz", "/etc/passwd"])
-def test_only_http(target, url):
-    with pytest.raises(InputError, match="http or https"):
-        download(url, target)
-
-
-def test_nobody_there(target):
-    with pytest.raises(InputError, match="cannot be reached"):
-        download("http://127.0.0.1:9/a.tgz", target, settings=QUICK)
-
-
-def test_full_disk(server, target, tmp_path, monkeypatch):
-    server.files["/a.tgz"] = _archive(tmp_path)
-    with monkeypatch.context() as patch:
-        usage = type("Usage", (), {"free": 1000})
-        patch.setattr(download_module.shutil, "disk_usage", lambda _: usage)
-        with pytest.raises(InputError, match="MB free; make room"):
-            _get(server, target)
-    if Path("/dev/full").exists():
-        target.with_name("a.tgz.part").symlink_to("/dev/full")
-        with pytest.raises(InputError, match="cannot be written .No space left"):
-            _get(server, target)
-    assert not target.exists()
-
-
 def _publish(server: Site, folder: Path, *names: str) -> dict[str, bytes]:
-    found = {name: _archive(folder, seed=i, size=2000) for i, name in enumerate(names)}
+    found = {name: archive(folder, seed=i, size=2000) for i, name in enumerate(names)}
     server.files |= {f"/{name}_google_16k.tgz": data for name, data in found.items()}
     return found
 
@@ -337,7 +96,7 @@ def test_checksums_file(server, tmp_path):
     sums.write_text(f"{'0' * 64}  ./ycb/024_bowl_google_16k.tgz\n\n")
     (bowl,) = fetch("ycb", tmp_path / "a", only=["024_bowl"], mirror=server.url, checksums=sums)
     assert bowl.status == "failed" and "expected 0000" in bowl.reason
-    assert _tree(tmp_path / "a") == {RECORD}
+    assert tree(tmp_path / "a") == {RECORD}
     sums.write_text(f"{hashlib.sha256(data).hexdigest()} *024_bowl_google_16k.tgz\n")
     (bowl,) = fetch("ycb", tmp_path / "a", only=["024_bowl"], mirror=server.url, checksums=sums)
     assert bowl.status == "fetched"
@@ -372,7 +131,7 @@ def test_hostile_names_write_nothing(server, tmp_path, name):
                 "google_scanned_objects", tmp_path / "o", only=only, mirror=f"{server.url}/models"
             )
         assert "\n" not in str(error.value)
-    assert not _tree(tmp_path)
+    assert not tree(tmp_path)
 
 
 @pytest.mark.parametrize("listing", [b"<html>", b'{"name": "x"}', b'[{"title": "x"}]', b"[]", None])
@@ -402,7 +161,7 @@ def test_gated_sources_say_how(tmp_path, monkeypatch, capsys):
         assert main(["assets", "fetch", name]) == 2
         printed = capsys.readouterr().out
         assert "register at https://" in printed and PUBLISHERS[name].licence in printed
-    assert not _tree(tmp_path)
+    assert not tree(tmp_path)
     assert set(SOURCES) <= set(PUBLISHERS)
 
 

@@ -1,4 +1,4 @@
-"""Let the tests of this folder import `episode_driver`, and give them every task without sensors."""
+"""Let the tests of this folder import their helper modules, and give them tasks."""
 
 from __future__ import annotations
 
@@ -17,3 +17,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 def blind(request) -> composer.Environment:
     """One environment a task, without sensors, for long runs."""
     return suite.load(*request.param, seed=0, observations="state")
+
+
+@pytest.fixture(
+    scope="module",
+    params=["single_object/target_pose", "articulated/store_chips_can_middle_drawer"],
+)
+def ideal(request) -> composer.Environment:
+    """A task with every observation, none of them noisy."""
+    from observed_scenes import EVERYTHING, load
+
+    return load(tuple(request.param.split("/")), EVERYTHING)
