@@ -8,14 +8,14 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj.control.arm_model import ArmModel
+from manipose_mj.control.belief import Senses
 from manipose_mj.control.clearing import in_clutter, is_supported
 from manipose_mj.control.executor import Action, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.motion_planner import MotionPlanner
-from manipose_mj.control.oracle import OracleSenses
 from manipose_mj.control.plan import Plan, Step, plan_to_json
 from manipose_mj.control.planner import make_plan
-from manipose_mj.control.planning_scene import PlanningScene
+from manipose_mj.control.pose_sources import make_senses
 from manipose_mj.control.primitives import Primitives
 from manipose_mj.control.recovery import let_go_safely
 from manipose_mj.errors import InputError
@@ -49,24 +49,28 @@ class _Progress:
 class Baseline:
     """Plans and acts in one environment; build it once, run it for many episodes."""
 
-    def __init__(self, environment: composer.Environment) -> None:
+    def __init__(self, environment: composer.Environment, pose: str = "oracle") -> None:
         """Compiles the planner's models.
 
         Args:
           environment: Of one of this package's tasks, after its first reset.
+          pose: Where object poses come from, one of `POSE_SOURCES`.
+
+        Raises:
+          InputError: There is no such source.
         """
         task = environment.task
         assert isinstance(task, ManipulationTask)
         self._task = task
         self._physics = environment.physics
-        model = self._physics.model.ptr
-        robot = task.robot.mjcf_model.model
-        self._scene = PlanningScene(
-            model, model.body(f"{robot}/").id, model.body(f"{robot}/hand").id
-        )
-        self._arm = ArmModel(task.root_entity.mjcf_model, robot)
-        self._senses = OracleSenses(task, self._physics, self._scene)
+        self._arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
+        self._senses = make_senses(pose, task, self._physics)
         self.status = ""
+
+    @property
+    def senses(self) -> Senses:
+        """Where the baseline's knowledge comes from."""
+        return self._senses
 
     def actions(self, seed: int) -> Iterator[Action]:
         """The actions of one episode, from the start state to the goal.
@@ -79,7 +83,8 @@ class Baseline:
         """
         self.status = ""
         timestep = self._task.control_timestep
-        planner = MotionPlanner(self._scene, self._arm, timestep, np.random.default_rng(seed))
+        scene = self._senses.begin(seed)
+        planner = MotionPlanner(scene, self._arm, timestep, np.random.default_rng(seed))
         executor = Executor(self._senses, timestep)
         primitives = Primitives(executor, planner)
         progress = _Progress()

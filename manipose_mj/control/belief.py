@@ -6,6 +6,7 @@ knows the difference.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from jaxtyping import Bool, Float
 
 from asset_pipeline.assets import Cavity, GraspSet, Joint, StablePose
 from asset_pipeline.labelling.label import PoseLabel
+from manipose_mj.control.planning_scene import PlanningScene
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,24 @@ class Belief:
 
 
 class Senses(Protocol):
-    """Where a policy's knowledge comes from."""
+    """Where a policy's knowledge comes from.
+
+    Attributes:
+      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
+    """
+
+    sources: Mapping[str, str]
+
+    def begin(self, seed: int) -> PlanningScene:
+        """An episode begins.
+
+        Args:
+          seed: Of whatever is drawn.
+
+        Returns:
+          The scene that beliefs of this episode name bodies and geoms of.
+        """
+        ...
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
         """Joint angles [rad] and opening [m], cheap enough for every control step."""
@@ -97,4 +116,8 @@ class Senses(Protocol):
 
     def look(self) -> Belief:
         """The whole belief; the planning scene is brought up to date with it."""
+        ...
+
+    def hold(self, name: str | None) -> None:
+        """The hand holds this from now on; None: it has let go."""
         ...

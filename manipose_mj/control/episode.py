@@ -16,12 +16,13 @@ from asset_pipeline.assets import Asset
 from asset_pipeline.catalogue import Split
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
+from manipose_mj.control.estimate_errors import EstimateErrors
 from manipose_mj.control.failure import StageFailure
+from manipose_mj.control.pose_sources import check_pose_source, sensors_for
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
 from manipose_mj.tasks.base import ManipulationTask
 
-POSE_SOURCES = ("oracle",)
 _RECORD_EVERY = 5  # control steps
 
 
@@ -41,7 +42,7 @@ def run_episode(
       task: `"domain/task"`.
       episode: Index, copied into the result.
       seed: Of the start state and of the motion planner.
-      pose: Where object poses come from: `"oracle"`.
+      pose: Where object poses come from: `"oracle"` or `"estimated"`.
       assets: Folder of built assets to take the object from.
       object_name: Which asset of that folder, or of the built-in catalogue.
       split: Which built-in objects, train or test.
@@ -49,11 +50,11 @@ def run_episode(
     Raises:
       InputError: Something named does not exist or cannot be used.
     """
-    if pose not in POSE_SOURCES:
-        raise unknown_name("pose source", pose, POSE_SOURCES)
+    check_pose_source(pose)
     started = time.perf_counter()
-    environment, baseline = _environment(task, assets, object_name, split)
+    environment, baseline = _environment(task, assets, object_name, split, pose)
     judge = _reset(environment, seed)
+    estimates = EstimateErrors(judge, environment.physics, baseline)
     baseline.status = ""  # the generator below resets it too late for the first record
     recorder = _Recorder(environment, baseline)
     recorder.record()
@@ -61,6 +62,7 @@ def run_episode(
     steps = 0
     try:
         for action in baseline.actions(seed):
+            estimates.after_planning()
             last = environment.step(action).last()
             steps += 1
             recorder.after_step(steps)
@@ -70,11 +72,14 @@ def run_episode(
                     failure = StageFailure("physics", environment.failure_reason)
                 break
     except StageFailure as gave_up:
+        estimates.after_planning()
         failure = gave_up
     physics = environment.physics
     success = judge.succeeded(physics) and (failure is None or failure.stage != "physics")
     if failure is None and not success:
         failure = StageFailure("release", "the goal is not met though the plan was carried out")
+    if failure is not None and not success:
+        failure = estimates.cause(failure)
     recorder.record()
     error = judge.goal_error(physics)
     result = EpisodeResult(
@@ -93,6 +98,8 @@ def run_episode(
         sim_time=round(steps * judge.control_timestep, 6),
         max_penetration=judge.max_penetration,
         wall_s=time.perf_counter() - started,
+        estimate_translation_error=estimates.translation,
+        estimate_rotation_error=estimates.rotation,
     )
     return result, recorder.trajectory()
 
@@ -106,7 +113,7 @@ def start_state(
     split: Split = "train",
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """The model and the state in which the episode of this seed starts; arguments as for an episode."""
-    environment, _ = _environment(task, assets, object_name, split)
+    environment, _ = _environment(task, assets, object_name, split, "oracle")
     _reset(environment, seed)
     return environment.physics.model.ptr, environment.physics.data.ptr
 
@@ -150,21 +157,32 @@ def load_environment(
     assets: Path | None = None,
     object_name: str | None = None,
     split: Split = "train",
+    pose: str = "oracle",
 ) -> composer.Environment:
     """The environment in which episodes take place; arguments as for an episode."""
     domain, _, name = task.partition("/")
     objects = _objects(assets, object_name)
-    return suite.load(domain, name, seed=0, observations="state", objects=objects, split=split)
+    return suite.load(
+        domain,
+        name,
+        seed=0,
+        observations="state",
+        sensors=sensors_for(pose),
+        objects=objects,
+        split=split,
+    )
 
 
 @lru_cache(maxsize=4)
 def _environment(
-    task: str, assets: Path | None, object_name: str | None, split: Split
+    task: str, assets: Path | None, object_name: str | None, split: Split, pose: str
 ) -> tuple[composer.Environment, Baseline]:
     """Compiled once per process and scene."""
-    environment = load_environment(task, assets=assets, object_name=object_name, split=split)
+    environment = load_environment(
+        task, assets=assets, object_name=object_name, split=split, pose=pose
+    )
     environment.reset()
-    return environment, Baseline(environment)
+    return environment, Baseline(environment, pose)
 
 
 def _objects(assets: Path | None, object_name: str | None) -> tuple[Asset, ...] | None:

@@ -34,6 +34,10 @@ class Executor:
         """A fresh belief."""
         return self._senses.look()
 
+    def hold(self, name: str | None) -> None:
+        """Tell the senses what the hand holds from now on; None: nothing."""
+        self._senses.hold(name)
+
     @property
     def command(self) -> Action:
         """The action that changes nothing."""

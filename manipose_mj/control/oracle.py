@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from dm_control import mjcf
 from jaxtyping import Float
 
-from asset_pipeline.assets import GraspSet, MovingPart
-from manipose_mj.control.belief import Belief, ObjectBelief, PartBelief
+from asset_pipeline.assets import GraspSet
+from manipose_mj.control.belief import Belief, ObjectBelief
+from manipose_mj.control.furniture_senses import TrueFurniture
 from manipose_mj.control.planning_scene import PlanningScene, subtree_geoms
-from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.poses import invert
+from manipose_mj.mjcf.objects import RigidObject
 from manipose_mj.tasks.base import ManipulationTask
 
 
@@ -21,6 +23,12 @@ class OracleSenses:
         self._task = task
         self._physics = physics
         self._scene = scene
+        self._furniture = TrueFurniture(task, physics)
+        self.sources: Mapping[str, str] = {"objects": "true", "furniture": self._furniture.source}
+
+    def begin(self, seed: int) -> PlanningScene:
+        """The scene that never changes."""
+        return self._scene
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
         """Joint angles [rad] and opening [m]."""
@@ -32,12 +40,10 @@ class OracleSenses:
         self._scene.synchronise(physics.model.ptr, physics.data.qpos)
         joints, opening = self.robot()
         objects = {name: self._object(name, entity) for name, entity in self._task.movable.items()}
-        parts = {
-            part.name: part
-            for furniture in self._task.furnishings
-            for part in self._parts(furniture, objects)
-        }
-        return Belief(joints, opening, objects, parts)
+        return Belief(joints, opening, objects, self._furniture.parts(self._scene, objects))
+
+    def hold(self, name: str | None) -> None:
+        """Nothing to remember: what is held is seen."""
 
     def _object(self, name: str, entity: RigidObject) -> ObjectBelief:
         frame = mjcf.get_attachment_frame(entity.mjcf_model)
@@ -53,41 +59,3 @@ class OracleSenses:
             geoms=subtree_geoms(self._scene.model, body),
             rests=entity.asset.stable_poses,
         )
-
-    def _parts(
-        self, furniture: ArticulatedObject, objects: dict[str, ObjectBelief]
-    ) -> list[PartBelief]:
-        found = []
-        for part in furniture.asset.parts:
-            if part.handle is None:
-                continue
-            element = furniture.mjcf_model.find("body", part.name)
-            body = int(self._physics.bind(element).element_id)
-            found.append(
-                PartBelief(
-                    name=part.name,
-                    base_pose=furniture.base_pose(self._physics),
-                    pose=furniture.part_pose(self._physics, part.name),
-                    opening=furniture.opening(self._physics, part.name),
-                    joint=part.joint,
-                    handle=part.handle,
-                    cavity=part.cavity,
-                    body=body,
-                    geoms=subtree_geoms(self._scene.model, body),
-                    contents=self._contents(furniture, part, objects),
-                )
-            )
-        return found
-
-    def _contents(
-        self, furniture: ArticulatedObject, part: MovingPart, objects: dict[str, ObjectBelief]
-    ) -> tuple[int, ...]:
-        """Bodies of the objects whose label origin lies in a drawer's cavity."""
-        if part.cavity is None or not part.cavity.moves_with_part:
-            return ()
-        to_cavity = invert(furniture.cavity_pose(self._physics, part.name))
-        inside = []
-        for thing in objects.values():
-            if (np.abs((to_cavity @ thing.label_pose)[:3, 3]) < part.cavity.extents / 2).all():
-                inside.append(thing.body)
-        return tuple(inside)

@@ -87,6 +87,7 @@ class Primitives:
         if belief.opening < min(0.5 * pick.width, pick.width - 0.004):
             yield from self._let_go(name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
+        self._executor.hold(name)
         self._held = _Held(name, pick, self._pose_in_hand(belief, name))
 
     def move_to(self, step: Step) -> Actions:
@@ -112,6 +113,7 @@ class Primitives:
         opening = min(belief.opening + OPENING_MARGIN, MAX_OPENING)
         yield from self._executor.open_to(opening)
         yield from self._executor.wait(_SETTLE)
+        self._executor.hold(None)
         belief = self._executor.perceive()
         yield from self._executor.follow(self._retreat(belief, name))
 

@@ -42,6 +42,9 @@ class EpisodeResult:
       sim_time: Simulated time [s].
       max_penetration: Deepest contact over the episode [m].
       wall_s: Wall-clock time [s].
+      estimate_translation_error: Largest error of an estimate that an object was grasped with [m];
+        None for true poses, and where nothing was grasped.
+      estimate_rotation_error: The same for the rotation, the least over the symmetry [rad].
     """
 
     task: str
@@ -59,6 +62,8 @@ class EpisodeResult:
     sim_time: float
     max_penetration: float
     wall_s: float
+    estimate_translation_error: float | None = None
+    estimate_rotation_error: float | None = None
 
     def __post_init__(self) -> None:
         if self.failure is not None and self.failure not in STAGES:
@@ -87,6 +92,10 @@ class Trajectory:
     annotations: list[str]
 
 
+# Fields that older records lack.
+_SINCE = {"estimate_translation_error": None, "estimate_rotation_error": None}
+
+
 def to_line(result: EpisodeResult) -> str:
     """The result as one line of JSON, with its newline; NumPy scalars become plain numbers.
 
@@ -104,7 +113,7 @@ def from_line(line: str) -> EpisodeResult:
     """
     document = json.loads(line)
     names = [f.name for f in fields(EpisodeResult)]
-    if not isinstance(document, dict) or sorted(document) != sorted(names):
+    if not isinstance(document, dict) or sorted({**_SINCE, **document}) != sorted(names):
         raise ValueError(f"expected an object with the fields {', '.join(names)}")
     return EpisodeResult(**document)
 

@@ -92,9 +92,9 @@ def test_a_held_object_does_not_slip(name):
     )
     environment.reset()
     baseline, task, physics = Baseline(environment), environment.task, environment.physics
-    executor = Executor(baseline._senses, task.control_timestep)
+    executor = Executor(baseline.senses, task.control_timestep)
     rng = np.random.default_rng(0)
-    planner = MotionPlanner(baseline._scene, baseline._arm, task.control_timestep, rng)
+    planner = MotionPlanner(baseline.senses.begin(0), baseline._arm, task.control_timestep, rng)
     primitives = Primitives(executor, planner)
 
     def play(actions) -> None:
@@ -152,7 +152,7 @@ def test_stopping_short_of_the_goal_is_a_failure(monkeypatch):
 
 
 def test_running_out_of_time_is_recorded(monkeypatch):
-    environment, _ = episode._environment(TARGET_POSE, None, None, "train")
+    environment, _ = episode._environment(TARGET_POSE, None, None, "train", "oracle")
     monkeypatch.setattr(environment, "_time_limit", 0.1)
     result = _fail(monkeypatch, lambda self, seed: iter([HOLD] * 100))
     assert (result.failure, result.steps) == ("timeout", 5)

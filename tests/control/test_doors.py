@@ -35,8 +35,8 @@ def scene(request) -> tuple[MotionPlanner, Belief, PartBelief]:
     environment = suite.load("articulated", request.param, seed=0, observations="state")
     environment.reset()
     baseline = Baseline(environment)
-    belief = baseline._senses.look()
-    planner = MotionPlanner(baseline._scene, baseline._arm, 0.02, np.random.default_rng(0))
+    belief = baseline.senses.look()
+    planner = MotionPlanner(baseline.senses.begin(0), baseline._arm, 0.02, np.random.default_rng(0))
     return planner, belief, belief.parts[environment.task.part.name]
 
 

@@ -55,8 +55,10 @@ class Scene:
             self.physics.forward()
         baseline = self._baseline
         rng = np.random.default_rng(0)
-        planner = MotionPlanner(baseline._scene, baseline._arm, self.task.control_timestep, rng)
-        return planner, baseline._senses.look()
+        planner = MotionPlanner(
+            baseline.senses.begin(0), baseline._arm, self.task.control_timestep, rng
+        )
+        return planner, baseline.senses.look()
 
 
 @pytest.fixture(scope="module")
