@@ -150,7 +150,9 @@ def estimate_rows(
         try:
             checked.append(_checked(cloud, jax.random.fold_in(key, number)))
         except InputError as error:
-            raise InputError(f"cloud {number}: {error}") from None
+            raise InputError(
+                f"cloud {number}: {error}" if len(clouds) > 1 else str(error)
+            ) from None
     longest = max(len(points) for points, _ in checked)
     size = next(size for size in BUCKETS if longest <= size)
     rows = [_padded(points, normals, size) for points, normals in checked]
