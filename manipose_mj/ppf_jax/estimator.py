@@ -21,6 +21,7 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, estimate_batch
+from manipose_mj.ppf_jax.outliers import not_alone
 from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load_weights
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
@@ -207,6 +208,8 @@ def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray
         rows = np.random.default_rng(seed).permutation(len(points))[:MAX_POINTS]
         points, normals = points[rows], None if normals is None else normals[rows]
     if normals is None:
+        kept = not_alone(points)
+        points = points[kept] if kept.sum() >= MIN_POINTS else points
         return points, cloud_normals(points)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.maximum(lengths, 1e-9)

@@ -27,6 +27,7 @@ from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, PairVotes
 from manipose_mj.ppf_jax.refinement import LEVELS, Reading, faced, free_space
 from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.rotations import from_vector, to_vector
+from manipose_mj.ppf_jax.spoiling import spoilt
 from manipose_mj.ppf_jax.stretching import stretched
 from manipose_mj.ppf_jax.symmetry import line_cosines, nearest_equivalent, vote_cosines
 from manipose_mj.ppf_jax.voting import Hypotheses, vote
@@ -41,6 +42,7 @@ class LossConfig:
 
     Attributes:
       stretch: Logarithm of the largest factor by which an object is stretched along an axis.
+      outliers: The largest share of a spoilt cloud's points that are anywhere around the object.
       pairs: Votes of a cloud.
       noised: The true frame, turned and shifted a little, evenly in the logarithm of how much.
       confused: Frames as they are mistaken: half turns, any turn about X, any turn at all.
@@ -52,6 +54,7 @@ class LossConfig:
     """
 
     stretch: float = 0.2
+    outliers: float = 0.25
     pairs: int = 1000
     noised: int = 3
     confused: int = 1
@@ -78,8 +81,9 @@ def cloud_loss(
       config: What is asked.
       key: Draws pairs, frames and free space.
     """
-    keys = jax.random.split(key, 7)
+    keys = jax.random.split(key, 8)
     sample = stretched(sample, config.stretch, key=keys[6])
+    sample = spoilt(sample, config.outliers, key=keys[7])
     cloud = normalised(sample.points, sample.normals, sample.mask)
     rotation = sample.pose[:3, :3]
     origin = (sample.pose[:3, 3] - cloud.centre) / cloud.scale

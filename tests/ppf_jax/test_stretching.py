@@ -10,6 +10,7 @@ from half_visible import half_visible_clouds
 
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.clouds import batch_clouds
+from manipose_mj.ppf_jax.spoiling import spoilt
 from manipose_mj.ppf_jax.stretching import stretched
 
 MOST = 0.15
@@ -55,3 +56,21 @@ def test_what_is_equivalent_or_ordered_stays_so():
     for batch in (before, boxes):
         order = np.diff(batch.extents, axis=1)
         assert np.all(order < 1e-3 * batch.extents[:, 1:])
+
+
+def test_a_quarter_of_the_clouds_get_outliers_and_the_label_stays():
+    clouds = half_visible_clouds("mug", [0, 1], 100, points=100)
+    batch = batch_clouds(clouds, rng=np.random.default_rng(0), points=120)
+    keys = jax.random.split(jax.random.key(0), len(batch))
+    after = jax.jit(jax.vmap(lambda s, k: spoilt(s, 0.4, key=k)))(batch, keys)
+    after = jax.tree.map(np.asarray, after)
+    moved = np.any(after.points != batch.points, axis=-1)
+    assert np.array_equal(np.any(after.normals != batch.normals, axis=-1), moved)
+    assert 0.1 < moved.any(axis=1).mean() < 0.4 and not moved[~batch.mask].any()
+    shares = moved.sum(axis=1)[moved.any(axis=1)] / 100
+    assert 0.1 < shares.mean() < 0.3 and shares.max() < 0.6
+    reach = np.linalg.norm(after.points - batch.pose[:, None, :3, 3], axis=-1)
+    assert np.all(reach[moved] < np.repeat(batch.extents.max(axis=1), moved.sum(axis=1)))
+    assert np.all(np.sum(after.normals * after.points, axis=-1)[moved] <= 0)
+    assert np.allclose(np.linalg.norm(after.normals[moved], axis=-1), 1, atol=1e-5)
+    assert np.array_equal(after.pose, batch.pose) and np.array_equal(after.mask, batch.mask)
