@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Literal
 
 import mujoco
@@ -13,15 +15,19 @@ from jaxtyping import Float, Int
 from manipose_mj.errors import unknown_name
 from manipose_mj.mjcf.panda_kinematics import (
     ACCELERATION_LIMITS,
+    DH,
+    FLANGE_OFFSET,
     GRIP_FORCE,
     HOME,
     MAX_OPENING,
     POSITION_LIMITS,
+    TCP_OFFSET,
+    TCP_SPEED_LIMIT,
     TORQUE_LIMITS,
     VELOCITY_LIMITS,
 )
 from manipose_mj.mjcf.panda_menagerie import find_menagerie_panda, require_menagerie_panda
-from manipose_mj.mjcf.panda_model import build_panda
+from manipose_mj.mjcf.panda_model import SERVO_LAG, build_panda
 
 __all__ = [
     "ACCELERATION_LIMITS",
@@ -29,6 +35,7 @@ __all__ = [
     "HOME",
     "MAX_OPENING",
     "POSITION_LIMITS",
+    "TCP_SPEED_LIMIT",
     "TORQUE_LIMITS",
     "VELOCITY_LIMITS",
     "Panda",
@@ -36,6 +43,12 @@ __all__ = [
 ]
 
 _LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
+# A servo whose set-point stays this far ahead drives its joint, or the TCP, at the limit of its speed.
+_JOINT_LEAD = SERVO_LAG * VELOCITY_LIMITS  # [rad]
+_TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
+# The TCP is never further than this from a joint's axis [m].
+_LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
+_REACH = np.cumsum(_LINKS[::-1])[::-1]
 Visuals = Literal["auto", "primitive", "menagerie"]
 
 
@@ -69,7 +82,7 @@ class Panda(composer.Entity):
         self._finger_joints = [self._model.find("joint", f"finger_joint{i}") for i in (1, 2)]
         self._actuators = [self._model.find("actuator", f"actuator{i}") for i in range(1, 8)]
         self._gripper_actuator = self._model.find("actuator", "gripper")
-        self._controls: tuple[mujoco.MjModel, Int[np.ndarray, "7"], int] | None = None
+        self._ids: _Ids | None = None
 
     def _build_observables(self) -> PandaObservables:
         return PandaObservables(self)
@@ -162,33 +175,46 @@ class Panda(composer.Entity):
         self, physics: mjcf.Physics, joints: Float[np.ndarray, "7"], opening: float
     ) -> None:
         """Writes joint angles [rad] and the opening [m] as controls, clipped to their limits."""
-        arm, gripper = self._control_ids(physics)
-        control = physics.data.ptr.ctrl
-        control[arm] = np.clip(joints, POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1])
-        control[gripper] = min(max(opening, 0.0), MAX_OPENING)
+        ids, control = self._model_ids(physics), physics.data.ptr.ctrl
+        control[ids.arm] = np.clip(joints, POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1])
+        control[ids.gripper] = min(max(opening, 0.0), MAX_OPENING)
 
     def follow_targets(self, physics: mjcf.Physics, target: Float[np.ndarray, "8"]) -> None:
-        """Applies joint angles [rad] and an opening [m], but no faster than the joints' velocity limits.
+        """Applies joint angles [rad] and an opening [m], but no faster than joints and TCP may move.
 
         To be called before every physics step. The servos of a real Panda refuse set-points that jump; here
-        they follow, as fast as is allowed.
+        they follow, as fast as is allowed. Nor do they run away from an arm that is stopped or falls behind:
+        it would be flung after them, at several times its limits, as soon as it could move again.
         """
-        arm, gripper = self._control_ids(physics)
-        control = physics.data.ptr.ctrl
+        ids, data = self._model_ids(physics), physics.data.ptr
+        control, angles = data.ctrl, data.qpos[ids.angles]
         most = VELOCITY_LIMITS * physics.model.ptr.opt.timestep
-        now = control[arm]
+        now = control[ids.arm]
         # Within a step's way of where it is, then within the limits; without np.clip's overhead.
         joints = np.minimum(np.maximum(target[:7], now - most), now + most)
-        control[arm] = np.minimum(np.maximum(joints, _LOWEST), _HIGHEST)
-        control[gripper] = min(max(target[7], 0.0), MAX_OPENING)
+        joints = np.minimum(np.maximum(joints, angles - _JOINT_LEAD), angles + _JOINT_LEAD)
+        lead = joints - angles
+        if np.abs(lead) @ _REACH > _TCP_LEAD:
+            way = _tcp_way(data, ids, lead)
+            if way > _TCP_LEAD:
+                joints = angles + lead * (_TCP_LEAD / way)
+        control[ids.arm] = np.minimum(np.maximum(joints, _LOWEST), _HIGHEST)
+        control[ids.gripper] = min(max(target[7], 0.0), MAX_OPENING)
 
-    def _control_ids(self, physics: mjcf.Physics) -> tuple[Int[np.ndarray, "7"], int]:
-        """Where the controls of the arm and the gripper are, looked up once per compiled model."""
-        if self._controls is None or self._controls[0] is not physics.model.ptr:
-            arm = np.array(physics.bind(self._actuators).element_id)
-            gripper = int(physics.bind(self._gripper_actuator).element_id)
-            self._controls = (physics.model.ptr, arm, gripper)
-        return self._controls[1:]
+    def _model_ids(self, physics: mjcf.Physics) -> _Ids:
+        """Where the robot is in a compiled model, looked up once for each."""
+        if self._ids is None or self._ids.model is not physics.model.ptr:
+            model = physics.model.ptr
+            joints = np.array(physics.bind(self._joints).element_id)
+            self._ids = _Ids(
+                model=model,
+                arm=np.array(physics.bind(self._actuators).element_id),
+                gripper=int(physics.bind(self._gripper_actuator).element_id),
+                joints=slice(int(joints[0]), int(joints[-1]) + 1),
+                angles=np.array(model.jnt_qposadr[joints]),
+                tcp=int(physics.bind(self.tcp_site).element_id),
+            )
+        return self._ids
 
     def configuration(self, physics: mjcf.Physics) -> tuple[Float[np.ndarray, "7"], float]:
         """The joint angles [rad] and the opening [m] now."""
@@ -202,6 +228,25 @@ class Panda(composer.Entity):
         pose[:3, :3] = np.reshape(site.xmat, (3, 3))
         pose[:3, 3] = site.xpos
         return pose
+
+
+@dataclass(frozen=True)
+class _Ids:
+    """Attributes: model; in it: arm, gripper, actuators; joints; angles, where in qpos; tcp, the site."""
+
+    model: mujoco.MjModel
+    arm: Int[np.ndarray, "7"]
+    gripper: int
+    joints: slice
+    angles: Int[np.ndarray, "7"]
+    tcp: int
+
+
+def _tcp_way(data: mujoco.MjData, ids: _Ids, turns: Float[np.ndarray, "7"]) -> float:
+    """How far the TCP goes for small turns of the joints [m]."""
+    x, y, z = (data.site_xpos[ids.tcp] - data.xanchor[ids.joints]).T
+    u, v, w = (data.xaxis[ids.joints] * turns[:, None]).T
+    return math.hypot(v @ z - w @ y, w @ x - u @ z, u @ y - v @ x)
 
 
 class PandaObservables(composer.Observables):

@@ -46,6 +46,7 @@ POSITION_LIMITS = np.array(
 )  # [rad]
 VELOCITY_LIMITS = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])  # [rad/s]
 ACCELERATION_LIMITS = np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0])  # [rad/s^2]
+TCP_SPEED_LIMIT = 1.7  # [m/s]
 TORQUE_LIMITS = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # [N m]
 
 MAX_OPENING = 0.08  # between the pads [m]

@@ -29,7 +29,8 @@ from manipose_mj.mjcf.panda_menagerie import visual_meshes
 
 # MuJoCo Menagerie's stiffness [N m/rad] with half its damping [N m s/rad]: critical at 2.8 kg m^2.
 _STIFFNESS = (4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0)
-_DAMPING = (225.0, 225.0, 175.0, 175.0, 100.0, 100.0, 100.0)
+# Damping over stiffness: how far behind its set-point a joint is at a steady speed [s].
+SERVO_LAG = 0.05
 _JOINT_DAMPING = 1.0
 # Reflected rotor inertia [kg m^2] that Franka states for the FR3's like drives (Drake's Panda).
 _ARMATURE = (0.606, 0.606, 0.462, 0.462, 0.206, 0.206, 0.206)
@@ -189,7 +190,7 @@ def _add_actuators(model: mjcf.RootElement) -> None:
             forcerange=(-TORQUE_LIMITS[i], TORQUE_LIMITS[i]),
             biastype="affine",
             gainprm=(_STIFFNESS[i],),
-            biasprm=(0.0, -_STIFFNESS[i], -_DAMPING[i]),
+            biasprm=(0.0, -_STIFFNESS[i], -SERVO_LAG * _STIFFNESS[i]),
         )
     model.actuator.add(
         "general",

@@ -19,6 +19,7 @@ from manipose_mj.mjcf.panda import (
     HOME,
     MAX_OPENING,
     POSITION_LIMITS,
+    TCP_SPEED_LIMIT,
     TORQUE_LIMITS,
     VELOCITY_LIMITS,
     Panda,
@@ -182,6 +183,26 @@ def test_gripper_opens_and_closes_at_the_speed_of_the_hand():
     assert panda.configuration(physics)[1] == pytest.approx(MAX_OPENING - 0.04, abs=0.002)
     steps(physics, 0.8)
     assert panda.configuration(physics)[1] < 1e-4
+
+
+def test_the_arm_keeps_to_its_speed_limits_even_once_it_breaks_free():
+    panda, physics = make_scene()
+    panda.set_configuration(physics, HOME, MAX_OPENING)
+    rng, model = np.random.default_rng(0), physics.model.ptr
+    joints = physics.bind(panda.joints)
+    loose = model.dof_damping.copy()
+    for goal in rng.uniform(POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1], (6, 7)):
+        model.dof_damping[:7] = 1e4  # as good as stuck
+        for t in np.arange(0.0, 1.0, physics.timestep()):
+            if t >= 0.3:
+                model.dof_damping[:] = loose
+            panda.follow_targets(physics, np.append(goal, MAX_OPENING))
+            physics.step()
+            tcp = np.zeros((3, model.nv))
+            site = physics.bind(panda.tcp_site).element_id
+            mujoco.mj_jacSite(model, physics.data.ptr, tcp, None, site)
+            assert np.linalg.norm(tcp @ physics.data.qvel) < 1.1 * TCP_SPEED_LIMIT
+            assert (np.abs(joints.qvel) < 1.15 * VELOCITY_LIMITS).all()
 
 
 def pad_contacts(panda, physics):
