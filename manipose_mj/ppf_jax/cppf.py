@@ -37,16 +37,23 @@ KERNEL_WIDTHS = (32, 64, 32, 32)
 RANK, POINT_WIDTH, GLOBAL_WIDTH = 32, 32, 8
 PAIR_WIDTHS = (32, 32, 16)
 _RELATION, _NEIGHBOUR = 6, 2  # invariants of a point, its neighbour and their mean; of two points
+_WITHIN = 0.995  # of the points that can be of the object
 # Where the published settings fold the angle to up although no symmetry asks for it: signs alone decide.
 _FOLDED = ("bottle", "can", "mug")
 
 
 def cppf_config(clouds: Sequence[LabelledCloud]) -> CppfConfig:
-    """The settings that CPPF takes from the training set: ranges, sizes, symmetry."""
-    farthest = max(
-        float(np.linalg.norm(transform(invert(cloud.pose), cloud.points), axis=1).max())
-        for cloud in clouds
-    )
+    """The settings that CPPF takes from the training set: ranges, sizes, symmetry.
+
+    The published ranges are about half the diagonal of the largest object's box. Labels need not be in
+    the middle, so here it is the distance of all but a few points, strays behind the object left out.
+    """
+    near = []
+    for cloud in clouds:
+        placed = transform(invert(cloud.pose), cloud.points)
+        inside = np.all(np.abs(placed) <= cloud.extents, axis=1)
+        near.append(np.linalg.norm(placed[inside], axis=1))
+    farthest = float(np.quantile(np.concatenate(near), _WITHIN))
     mean = np.mean([np.log(cloud.extents) for cloud in clouds], axis=0)
     first, second, third = (round(float(v), 4) for v in mean)
     symmetry = common_symmetry(cloud.symmetry for cloud in clouds)

@@ -39,7 +39,7 @@ class CppfConfig:
       pairs: At inference.
       circle: Votes of each pair on its circle, and on its cone.
       cell: Of the grid [m].
-      cells: Most cells along a side; what is farther than they reach is not voted for.
+      cells: Most cells along a side, about the median point: strays may be metres away.
       cone_pairs: That vote for directions.
       directions: On the Fibonacci sphere; what "1.5 deg" comes to there.
       angle: Between a vote and a direction it counts for [rad].
@@ -56,7 +56,7 @@ class CppfConfig:
     pairs: int = 100_000
     circle: int = 72
     cell: float = 0.005
-    cells: int = 80
+    cells: int = 100
     cone_pairs: int = 10_000
     directions: int = 480
     angle: float = float(np.radians(1.5))
@@ -179,8 +179,11 @@ def _voted_centre(
     config: CppfConfig,
 ) -> Float[Array, "3"]:
     """The fullest cell of the grid over the visible cloud's box, after trilinear votes on all circles."""
-    low = jnp.min(jnp.where(mask[:, None], points, jnp.inf), axis=0)
-    high = jnp.max(jnp.where(mask[:, None], points, -jnp.inf), axis=0)
+    ordered = jnp.sort(jnp.where(mask[:, None], points, jnp.inf), axis=0)
+    count = jnp.maximum(jnp.sum(mask), 1)
+    middle, reach = ordered[(count - 1) // 2], 0.5 * config.cells * config.cell
+    low = jnp.maximum(ordered[0], middle - reach)
+    high = jnp.minimum(ordered[count - 1], middle + reach)
     cells = jnp.minimum(((high - low) / config.cell).astype(jnp.int32) + 1, config.cells)
     strides = jnp.array([config.cells**2, config.cells, 1])
     corners = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(8, 3)
