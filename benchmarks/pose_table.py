@@ -8,7 +8,9 @@ With `--weights DIR`, weights are read from `DIR/FOLDER/weights.npz`, FOLDER bei
 names its folder: CATEGORY for ours on unified labels, CATEGORY-original, CATEGORY-cppf, CATEGORY-cppf-original.
 Ours on unified labels are the package's own where DIR has none. What is not there is left out with a line.
 On original labels each estimate is held against the object's frame as its source has it; of an axis of
-revolution, wherever that frame has it, only the direction counts, as with unified labels.
+revolution, wherever that frame has it, only the direction counts, as with unified labels. How much these
+labels differ from one another, whatever the estimator: the row of what knows every pose and gives all objects
+the same of the sources' frames, the best one.
 
 Matchers see the category's typical object as their template, in the right size of its kind, and need
 `pip install 'manipose-mj[pose-bench]'`. Errors are means, medians in brackets; for mugs also as NOCS counts
@@ -60,6 +62,7 @@ PAPER: dict[str, tuple[float, float]] = {
 Row = dict[str, Any]
 # As rows are called, by whose weights they are.
 NETWORKS: dict[MethodName, str] = {"cppf": "CPPF as published", "ours": "ours"}
+ONE_FRAME = "true pose, one frame for all"
 SHOWN_RECALLS = ((5, 2), (10, 2), (10, 5))  # [deg, cm]
 LABEL_SETS: tuple[LabelSet, ...] = ("unified", "original")
 
@@ -75,14 +78,13 @@ def rows_of(
     if category in PAPER:
         origin, degrees = PAPER[category]
         yield _row(category, "paper", "unified", {"origin_cm_mean": origin, "deg_mean": degrees})
-    frames: dict[str, SourceLabel] | None = None
+    frames = source_labels(clouds, jobs=jobs)
+    yield _measured(category, ONE_FRAME, "original", clouds, _one_frame(clouds, frames), frames)
     for method, name in NETWORKS.items():
         for labels in LABEL_SETS:
             estimator = _estimator(category, weights, method, labels)
             if estimator is None:
                 continue
-            if labels == "original" and frames is None:
-                frames = source_labels(clouds, jobs=jobs)
             sources = frames if labels == "original" else None
             yield _measured(category, name, labels, clouds, answers(estimator, clouds), sources)
     shape = template(category) if matchers else None
@@ -115,6 +117,20 @@ def _estimator(
     except InputError as error:
         log.warning("%s, %s, %s labels: left out (%s)", category, method, labels, error)
     return None
+
+
+def _one_frame(clouds: Sequence[LabelledCloud], frames: dict[str, SourceLabel]) -> Answers:
+    """What knows every unified pose and says one source's frame for all objects: the best such frame.
+
+    What no cloud tells is from which source an object is.
+    """
+    found = []
+    for frame in frames.values():
+        poses = np.stack([cloud.pose for cloud in clouds]) @ frame.T_label_source
+        found.append((pose_errors(poses, clouds, sources=frames).rotation.mean(), poses))
+    _, poses = min(found, key=lambda row: row[0])
+    none = np.full(len(clouds), np.nan)
+    return Answers(poses, none, float("nan"))
 
 
 def _measured(
