@@ -23,6 +23,7 @@ def train_articulated(
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
     seed: int = 0,
+    start_from: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     jobs: int = CORES,
 ) -> int:
     """Train the estimator of handles and joints on rendered scenes of the catalogue's furniture.
@@ -38,6 +39,7 @@ def train_articulated(
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
       seed: Of the first weights and of all that training draws.
+      start_from: Weights of an earlier training to start from, instead of random ones.
       jobs: Processes that render.
     """
     one_thread_per_process()
@@ -60,7 +62,7 @@ def train_articulated(
     from manipose_mj.ppf_jax.articulated_subject import CATEGORIES
     from manipose_mj.ppf_jax.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training import CURVE_FILE, Row, TrainingConfig, train
-    from manipose_mj.ppf_jax.weights import TrainedModel, save_weights
+    from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(
@@ -81,6 +83,7 @@ def train_articulated(
             TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss()),  # pyright: ignore[reportArgumentType]
             out,
             build=ArticulatedModel,
+            initial=None if start_from is None else load_weights(start_from).model,
             minutes=minutes,
             progress=show,
         )

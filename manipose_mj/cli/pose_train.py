@@ -31,6 +31,7 @@ def train_pose(
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
     seed: int = 0,
+    start_from: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     jobs: int = CORES,
 ) -> int:
     """Train a pose estimator on rendered views of the catalogue's training objects.
@@ -53,6 +54,7 @@ def train_pose(
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
       seed: Of the first weights and of all that training draws.
+      start_from: Weights of an earlier training to start from, instead of random ones.
       jobs: Processes that render.
     """
     one_thread_per_process()
@@ -67,7 +69,7 @@ def train_pose(
     from manipose_mj.ppf_jax.methods import METHODS
     from manipose_mj.ppf_jax.training import CURVE_FILE, Row, train
     from manipose_mj.ppf_jax.view_cache import batch_stream
-    from manipose_mj.ppf_jax.weights import TrainedModel, save_weights
+    from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
     clouds = source.rendered("train", setting, views)
@@ -91,6 +93,7 @@ def train_pose(
             replace(chosen.training, steps=steps, seed=seed),
             folder,
             build=chosen.build,
+            initial=None if start_from is None else load_weights(start_from).model,
             held_out=[next(stream) for _ in range(checks)],
             minutes=minutes,
             progress=show,

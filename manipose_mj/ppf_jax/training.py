@@ -88,6 +88,7 @@ def train(
     folder: Path,
     *,
     build: Callable[..., Any] = PoseModel,
+    initial: Any = None,
     held_out: Sequence[CloudBatch] = (),
     minutes: float | None = None,
     progress: Callable[[Row], None] | None = None,
@@ -103,17 +104,19 @@ def train(
       config: How.
       folder: Where the state and the curve are kept.
       build: Makes the model from `model_config` and `rng`, its random numbers.
+      initial: A model of the same sizes, whose weights to start from instead of random ones.
       held_out: Batches to measure on, of one shape.
       minutes: Ends the training, cooled down, if the steps do not.
       progress: Told every row of the curve.
 
     Raises:
-      InputError: The folder holds another training's state.
+      InputError: The folder holds another training's state, or `initial` has other sizes.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    state, curve = _resumed(
-        folder, build(model_config, rng=np.random.default_rng(config.seed)), config
-    )
+    model = build(model_config, rng=np.random.default_rng(config.seed))
+    if initial is not None:
+        model = with_weights_of(model, initial)
+    state, curve = _resumed(folder, model, config)
     start = int(state.step)
     began = saved = time.monotonic()
     earlier = float(curve[-1]["seconds"]) if curve else 0.0
@@ -143,6 +146,19 @@ def train(
             saved = time.monotonic()
     _save(folder, state, curve, config)
     return state.model
+
+
+def with_weights_of(model: Any, other: Any) -> Any:
+    """The model with the weights of another of its sizes.
+
+    Raises:
+      InputError: The sizes differ.
+    """
+    mine, theirs = jax.tree.leaves(model), jax.tree.leaves(other)
+    if [np.shape(leaf) for leaf in mine] != [np.shape(leaf) for leaf in theirs]:
+        raise InputError("the weights to start from are of a model of other sizes; train anew")
+    leaves = [jnp.asarray(new, old.dtype) for old, new in zip(mine, theirs, strict=True)]
+    return jax.tree.unflatten(jax.tree.structure(model), leaves)
 
 
 def learning_rate(config: TrainingConfig, step: int, share: float) -> float:

@@ -122,6 +122,17 @@ def test_a_broken_training_goes_on_as_if_it_had_not(bowls, model_config, whole, 
         train(_batches(bowls), model_config, CONFIG, tmp_path)
 
 
+def test_it_starts_from_weights_of_the_same_sizes(bowls, model_config, whole, tmp_path):
+    model = train(_batches(bowls), model_config, CONFIG, tmp_path, initial=whole[0], minutes=1e-9)
+    for mine, theirs in zip(jax.tree.leaves(model), jax.tree.leaves(whole[0]), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    narrow = dataclasses.replace(
+        model_config, network=dataclasses.replace(model_config.network, width=8)
+    )
+    with pytest.raises(InputError, match="other sizes"):
+        train(_batches(bowls), narrow, CONFIG, tmp_path / "b", initial=whole[0], minutes=1e-9)
+
+
 def test_no_time_means_no_steps(bowls, model_config, tmp_path):
     train(_batches(bowls, breaks_at=0), model_config, CONFIG, tmp_path, minutes=1e-9)
     assert json.loads((tmp_path / CURVE_FILE).read_text()) == []
