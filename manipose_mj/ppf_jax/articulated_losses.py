@@ -11,10 +11,17 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from manipose_mj.ppf_jax.articulated_clouds import FurnitureBatch
 from manipose_mj.ppf_jax.articulated_model import ArticulatedModel, body_cloud, body_votes
-from manipose_mj.ppf_jax.body_frame import BODY_IN_LABEL, BODY_TURNS, aligned
+from manipose_mj.ppf_jax.body_frame import (
+    BODY_IN_LABEL,
+    BODY_TURNS,
+    CANDIDATES,
+    aligned,
+    candidates,
+)
 from manipose_mj.ppf_jax.features import normalised
 from manipose_mj.ppf_jax.network import PairVotes
 from manipose_mj.ppf_jax.part_network import LENGTH, SLIDE_LENGTH, TURN, BodyCloud, PointVotes
+from manipose_mj.ppf_jax.part_voting import unit
 from manipose_mj.ppf_jax.rotations import from_vector, to_vector
 from manipose_mj.ppf_jax.symmetry import vote_cosines
 
@@ -34,6 +41,7 @@ class ArticulatedLoss:
       turn: Largest error of the body's frame before it is aligned, drawn evenly up to it [rad].
       unaligned: Share of the clouds whose frame is left as it is drawn.
       rolled: Share of the clouds whose frame is a quarter turn off about the front.
+      strange: Share of those whose frame has another side for the front: only the judge learns of them.
     """
 
     pairs: int = 1000
@@ -41,6 +49,7 @@ class ArticulatedLoss:
     turn: float = float(np.radians(9.0))
     unaligned: float = 0.3
     rolled: float = 0.1
+    strange: float = 0.2
 
     def __call__(
         self, model: ArticulatedModel, sample: FurnitureBatch, *, key: PRNGKeyArray
@@ -80,20 +89,23 @@ def varied(
 
     Returns:
       The cloud; what each point should vote for, by the names of `VOTES`; and `classes (n,)` int,
-      `moving (n,)` and `hinge (n,)` bool.
+      `moving (n,)` and `hinge (n,)` bool, and which of the `candidates` the frame is: 0 is the body's.
     """
-    keys = jax.random.split(key, 7)
+    keys = jax.random.split(key, 8)
     rotation = sample.body[:3, :3] @ BODY_IN_LABEL
     half = jnp.where(
         jax.random.bernoulli(keys[0]), jnp.diag(jnp.array([1.0, -1.0, -1.0])), jnp.eye(3)
     )
-    quarter = from_vector(jnp.array([np.pi / 2, 0.0, 0.0]))
-    rolled = jnp.where(jax.random.bernoulli(keys[1], config.rolled), quarter, jnp.eye(3))
+    share = jax.random.uniform(keys[1])
+    other = jax.random.randint(keys[7], (), 2, CANDIDATES)
+    which = jnp.where(share < config.rolled, 1, 0)
+    which = jnp.where(share > 1 - config.strange, other, which)
+    towards = -unit(jnp.sum(sample.points, axis=0))
     turn = jax.random.normal(keys[2], (3,))
     turn = turn / jnp.linalg.norm(turn) * jax.random.uniform(keys[3], maxval=config.turn)
-    right = rotation @ half @ rolled
+    right = candidates(rotation, towards)[which] @ half
     frame = right @ from_vector(turn)
-    settled = aligned(frame, sample.points, sample.normals, sample.mask)
+    settled, _ = aligned(frame, sample.points, sample.normals, sample.mask)
     frame = jnp.where(jax.random.bernoulli(keys[6], config.unaligned), frame, settled)
     off = jnp.swapaxes(frame, 0, 1) @ right
     cloud, centre = body_cloud(sample.points, sample.normals, sample.mask, frame)
@@ -129,7 +141,8 @@ def varied(
     }
     moving = sample.part >= 0
     classes = jnp.where(moving, 1 + sample.handle, 0)
-    return cloud, targets, {"classes": classes, "moving": moving, "hinge": sample.hinge[part]}
+    known = {"classes": classes, "moving": moving, "hinge": sample.hinge[part], "which": which}
+    return cloud, targets, known
 
 
 def part_losses(
@@ -159,4 +172,8 @@ def part_losses(
         scale = votes.log_scale[name]
         loss = off * jnp.exp(-scale) + scale
         losses[name] = 0.5 * jnp.sum(counted * loss) / jnp.maximum(jnp.sum(counted), 1)
+    sound = known["which"] < 2
+    losses = {name: jnp.where(sound, loss, 0.0) for name, loss in losses.items()}
+    right = known["which"] == 0
+    losses["frame"] = jax.nn.softplus(jnp.where(right, -votes.frame, votes.frame))
     return losses

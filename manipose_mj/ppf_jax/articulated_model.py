@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
-from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned
+from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned, candidates, normal_starts
 from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
@@ -37,6 +37,7 @@ class ArticulatedConfig:
       body_voting: How these votes are counted.
       body_points: Points that it looks at.
       body_pairs: Votes at inference.
+      normal_starts: Frames along normals that are tried besides those that pairs vote for.
       network: Sizes of the part network.
       voting: How its votes are counted.
       points: Points that it looks at.
@@ -47,6 +48,7 @@ class ArticulatedConfig:
     body_voting: VotingConfig = field(default_factory=VotingConfig)
     body_points: int = 512
     body_pairs: int = 4096
+    normal_starts: int = 8
     network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
@@ -119,7 +121,7 @@ def estimate_parts(
     *,
     key: PRNGKeyArray,
 ) -> PartEstimates:
-    """Vote for the body's frame, then in it for parts; look again where handles seem to be.
+    """Settle the body's frame, vote in it for parts, and look again where handles seem to be.
 
     A pure function of one cloud: `vmap` it.
 
@@ -133,11 +135,17 @@ def estimate_parts(
     """
     config = model.config
     body_key, first_key, second_key = jax.random.split(key, 3)
-    rotation = body_rotation(model, points, normals, mask, key=body_key)
     order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
     chosen = jnp.argsort(order)[: config.points]
-    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
-    votes = model.parts(cloud)
+    few = points[chosen], normals[chosen], mask[chosen]
+    settled = body_rotation(model, *few, key=body_key)
+    towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
+    frames = candidates(settled, towards)
+    # What the part network sees in each of them; the likeliest is the body's.
+    seen = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0]), frames)
+    best = jnp.argmax(seen.frame)
+    rotation, votes = frames[best], jax.tree.map(lambda leaf: leaf[best], seen)
+    cloud, centre = body_cloud(*few, rotation)
     first = find_parts(cloud, votes, config.voting)
     turn = from_vector(frame_turn(cloud, votes, config.voting))
     # The second time, half of the points are from where handles seem to be.
@@ -166,13 +174,19 @@ def body_rotation(
     *,
     key: PRNGKeyArray,
 ) -> Float[Array, "3 3"]:
-    """Columns: out of the front, up or down, and sideways, camera frame."""
+    """The body's axes in the camera frame: front, up or down and side as voted for, in that order or not.
+
+    From frames that the pairs vote for and others along normals, the one that most of the planes agree with.
+    """
     config = model.config
     sample_key, pair_key = jax.random.split(key)
     cloud = normalised(*sampled(points, normals, mask, count=config.body_points, key=sample_key))
     votes = body_votes(model, cloud, config.body_pairs, key=pair_key)
-    found = vote(votes, BODY_SYMMETRY, config.body_voting)
-    return aligned(found.rotation[0], points, normals, mask)
+    voted = vote(votes, BODY_SYMMETRY, config.body_voting).rotation
+    starts = jnp.concatenate([voted, normal_starts(normals, mask, config.normal_starts)])
+    settled, score = jax.vmap(lambda start: aligned(start, points, normals, mask))(starts)
+    # Where planes leave a turn open, votes decide: they come first.
+    return settled[jnp.argmax(score * jnp.linspace(1.0, 0.97, len(score)))]
 
 
 def body_votes(

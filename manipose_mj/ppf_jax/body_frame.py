@@ -16,6 +16,11 @@ from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 
 # Columns: X', Y', Z' in the label frame of the whole, whose X is up and whose Y is out of the front.
 BODY_IN_LABEL = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]], np.float32)
+# The axes in turn: columns are front, up and side, had the front been the first, second or third.
+_IN_TURN = np.stack([np.roll(np.eye(3), -k, axis=1) for k in range(3)]).astype(np.float32)
+_ABOUT_UP = np.diag([-1.0, 1.0, -1.0]).astype(np.float32)
+_QUARTER = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], np.float32)
+CANDIDATES = 6
 BODY_SYMMETRY = CommonSymmetry(axial=False, unsigned_x=False, unsigned_y=True)
 BODY_TURNS = np.stack([np.eye(3), np.diag([1.0, -1.0, -1.0])]).astype(np.float32)
 # A pair of points of one plane is across the plane's normal: how nearly, at first and in the end [rad].
@@ -33,8 +38,8 @@ def aligned(
     points: Float[Array, "n 3"],
     normals: Float[Array, "n 3"],
     mask: Bool[Array, "n"],
-) -> Float[Array, "3 3"]:
-    """The rotation nearby whose axes most of the planes are across.
+) -> tuple[Float[Array, "3 3"], Float[Array, ""]]:
+    """The rotation nearby whose axes most of the planes are across, and how many pairs say so.
 
     Normals from a noisy depth image lean towards the camera by degrees; points of one plane that are far
     apart know better. Pairs that are not of one plane are left out by Cauchy's weights.
@@ -55,13 +60,16 @@ def aligned(
     along = offset / length[:, None]
     far = length > _SHORTEST
 
-    def refine(round_: Array, current: Array) -> Array:
-        width = _WIDE * (_SHARP / _WIDE) ** (round_ / (_ROUNDS - 1))
+    def weights(current: Array, width: Array) -> tuple[Array, Array]:
         width = (width + _NOISE / length)[:, None]
         facing = jnp.minimum(jnp.abs(normals[first] @ current), jnp.abs(normals[second] @ current))
         across = along @ current
         weight = (far[:, None] & (facing > _FACING)) / (1 + (across / width) ** 2) ** 2
-        weight = weight * (_SHARP / width) ** 2
+        return across, weight * (_SHARP / width) ** 2
+
+    def refine(round_: Array, current: Array) -> Array:
+        width = _WIDE * (_SHARP / _WIDE) ** (round_ / (_ROUNDS - 1))
+        across, weight = weights(current, width)
         # along . (axis + turn x axis) = 0, for all three axes at once.
         rows = jnp.cross(current.T[None], along[:, None])
         matrix = jnp.einsum("pk,pki,pkj->ij", weight, rows, rows)
@@ -70,7 +78,46 @@ def aligned(
         turn = _solved(matrix + ridge * jnp.eye(3), right)
         return from_vector(turn) @ current
 
-    return jax.lax.fori_loop(0, _ROUNDS, refine, rotation)
+    settled = jax.lax.fori_loop(0, _ROUNDS, refine, rotation)
+    return settled, jnp.sum(weights(settled, jnp.asarray(_SHARP))[1])
+
+
+def normal_starts(
+    normals: Float[Array, "n 3"], mask: Bool[Array, "n"], count: int
+) -> Float[Array, "count 3 3"]:
+    """Frames along a random normal and another that is nearly across it.
+
+    Args:
+      normals: Unit, in random order, padding last.
+      mask: True for points.
+      count: How many.
+    """
+    present = jnp.maximum(jnp.sum(mask), 2)
+    first = normals[(jnp.arange(count) * 3) % present]
+    others = normals[(count * 3 + jnp.arange(32)) % present]
+    second = others[jnp.argmin(jnp.abs(first @ others.T), axis=1)]
+    second = second - jnp.sum(first * second, axis=-1, keepdims=True) * first
+    length = jnp.linalg.norm(second, axis=-1, keepdims=True)
+    # All of one normal: anything across it.
+    spare = jnp.cross(first, jnp.eye(3)[jnp.argmin(jnp.abs(first), axis=1)])
+    second = jnp.where(length > 0.1, second, spare)
+    second = second / jnp.linalg.norm(second, axis=-1, keepdims=True)
+    return jnp.stack([first, second, jnp.cross(first, second)], axis=-1)
+
+
+def candidates(
+    rotation: Float[Array, "3 3"], towards: Float[Array, "3"]
+) -> Float[Array, "candidates 3 3"]:
+    """The frames of the same axes whose front looks to the camera, but for half turns about it.
+
+    Args:
+      rotation: One of these frames, or one that looks away.
+      towards: From the furniture to the camera, in the frame that `rotation` maps into.
+    """
+    turned = rotation @ jnp.asarray(_IN_TURN)
+    away = turned[:, :, 0] @ towards < 0
+    turned = jnp.where(away[:, None, None], turned @ _ABOUT_UP, turned)
+    return jnp.stack([turned, turned @ _QUARTER], axis=1).reshape(CANDIDATES, 3, 3)
 
 
 def _solved(matrix: Float[Array, "3 3"], right: Float[Array, "3"]) -> Float[Array, "3"]:

@@ -75,12 +75,14 @@ class PointVotes(eqx.Module):
         [rad, or units of `SLIDE_LENGTH`]; the rotation vector by which the frame is off, in units of
         `TURN`.
       log_scale: By the same names `(n,)`, logarithm of the Laplace scale of each vote.
+      frame: Logit of the frame's being the body's, and not one whose front is another side.
     """
 
     logits: Float[Array, "n 3"]
     hinge: Float[Array, "n"]
     values: dict[str, Float[Array, "n k"]]
     log_scale: dict[str, Float[Array, "n"]]
+    frame: Float[Array, ""]
 
 
 class ContextLayer(eqx.Module):
@@ -138,6 +140,8 @@ class PartNetwork(eqx.Module):
     to_global: Dense
     head: tuple[Dense, ...]
     votes: Dense
+    judge_hidden: Dense
+    judge: Dense
     config: PartNetworkConfig = eqx.field(static=True)
 
     def __init__(self, config: PartNetworkConfig, *, rng: np.random.Generator):
@@ -153,6 +157,8 @@ class PartNetwork(eqx.Module):
         )
         outputs = CLASSES + 1 + sum(VOTES.values()) + len(VOTES)
         self.votes = Dense(config.hidden, outputs, rng=rng, gain=0.1)
+        self.judge_hidden = Dense(2 * width, config.hidden, rng=rng)
+        self.judge = Dense(config.hidden, 1, rng=rng, gain=0.1)
 
     def __call__(self, cloud: BodyCloud) -> PointVotes:
         """The votes of every point."""
@@ -168,10 +174,14 @@ class PartNetwork(eqx.Module):
         seen.append(known)
         whole = jnp.where(cloud.mask[:, None], self.to_global(known), -1e9)
         whole = jax.nn.relu(standardised(jnp.max(whole, axis=0)))
+        mean = jnp.sum(jnp.where(cloud.mask[:, None], known, 0.0), axis=0)
+        mean = mean / jnp.maximum(jnp.sum(cloud.mask), 1)
+        judged = self.judge_hidden(jnp.concatenate([whole, standardised(mean)]))
+        frame = self.judge(jax.nn.relu(judged))[0]
         hidden = jnp.concatenate([*seen, jnp.broadcast_to(whole, known.shape)], axis=-1)
         for layer in self.head:
             hidden = jax.nn.relu(standardised(layer(hidden)))
-        return _split(self.votes(hidden))
+        return _split(self.votes(hidden), frame)
 
 
 @jax.custom_vjp
@@ -209,7 +219,7 @@ def nearest_rows(cloud: BodyCloud, among: int, count: int) -> Int[Array, "n coun
     return jax.lax.top_k(-jnp.where(there, distances, jnp.inf), count)[1]
 
 
-def _split(raw: Float[Array, "n outputs"]) -> PointVotes:
+def _split(raw: Float[Array, "n outputs"], frame: Float[Array, ""]) -> PointVotes:
     values, log_scale, at = {}, {}, CLASSES + 1
     for name, size in VOTES.items():
         values[name] = raw[:, at : at + size]
@@ -219,4 +229,4 @@ def _split(raw: Float[Array, "n outputs"]) -> PointVotes:
         half = (_FARTHEST_LOG_SCALE - _NEAREST_LOG_SCALE) / 2
         log_scale[name] = middle + half * jnp.tanh((scale - middle) / half)
         at += size + 1
-    return PointVotes(raw[:, :CLASSES], raw[:, CLASSES], values, log_scale)
+    return PointVotes(raw[:, :CLASSES], raw[:, CLASSES], values, log_scale, frame)

@@ -25,7 +25,7 @@ from manipose_mj.ppf_jax.articulated_metrics import part_errors, summary
 from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
 from manipose_mj.ppf_jax.articulated_subject import catalogue_furniture
 from manipose_mj.ppf_jax.articulated_views import FurnitureSetting, render_furniture
-from manipose_mj.ppf_jax.body_frame import BODY_IN_LABEL, aligned
+from manipose_mj.ppf_jax.body_frame import BODY_IN_LABEL, aligned, candidates
 from manipose_mj.ppf_jax.network import NetworkConfig
 from manipose_mj.ppf_jax.part_network import (
     LENGTH,
@@ -124,13 +124,16 @@ def _true_votes(targets, known) -> PointVotes:
     }
     logits = 20.0 * jax.nn.one_hot(known["classes"], 3)
     hinge = jnp.where(known["hinge"], 10.0, -10.0)
-    return PointVotes(logits, hinge, values, dict.fromkeys(VOTES, jnp.full(count, -3.0)))
+    scales = dict.fromkeys(VOTES, jnp.full(count, -3.0))
+    return PointVotes(logits, hinge, values, scales, jnp.zeros(()))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_true_votes_give_the_true_parts(sample, seed):
     """Turned, mirrored, enlarged: what points vote for stays one consistent piece of furniture."""
-    cloud, targets, known = varied(sample, ArticulatedLoss(rolled=0.0), key=jax.random.key(seed))
+    cloud, targets, known = varied(
+        sample, ArticulatedLoss(rolled=0.0, strange=0.0), key=jax.random.key(seed)
+    )
     votes = _true_votes(targets, known)
     parts = jax.jit(find_parts, static_argnums=2)(cloud, votes, PartVotingConfig())
     seen = np.unique(np.asarray(sample.part[sample.part >= 0]))
@@ -177,11 +180,26 @@ def test_planes_settle_the_frame():
     normals = normals[order] @ truth.T
     start = truth @ rotation_about(np.array([0.0, 0.6, 0.8]), 0.12)
     mask = jnp.arange(1200) < 1100
-    found = jax.jit(aligned)(
+    found, _ = jax.jit(aligned)(
         jnp.asarray(start, jnp.float32), jnp.asarray(points), jnp.asarray(normals), mask
     )
     cosine = (np.trace(truth.T @ np.asarray(found)) - 1) / 2
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))) < 0.3
+
+
+def test_one_candidate_is_the_bodys_frame():
+    truth = np.asarray(from_vector(jnp.array([0.3, -1.2, 0.5])))
+    towards = truth @ np.array([0.8, 0.36, 0.48])
+    frames = np.asarray(candidates(jnp.asarray(truth), jnp.asarray(towards)))
+    np.testing.assert_allclose(frames[0], truth, atol=1e-6)
+    for start in (truth[:, [2, 0, 1]], truth @ np.diag([-1.0, -1.0, 1.0]), frames[3]):
+        others = np.asarray(candidates(jnp.asarray(start), jnp.asarray(towards)))
+        assert (others[:, :, 0] @ towards > 0).all()
+        np.testing.assert_allclose(np.linalg.det(others), 1.0, atol=1e-5)
+        # The body's own, or half a turn about its front from it.
+        alike = np.abs(np.einsum("ji,kji->ki", truth, others))
+        right = (alike > 0.999).all(axis=1)
+        assert right.sum() == 1 and truth[:, 0] @ others[right][0][:, 0] > 0.999
 
 
 def test_gradients_of_taken_rows_are_those_of_indexing():
