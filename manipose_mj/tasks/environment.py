@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,10 @@ from dm_control import composer
 from dm_control.rl.control import PhysicsError
 
 from manipose_mj.tasks.base import ManipulationTask
+
+log = logging.getLogger(__name__)
+
+_STARTS = 5  # drawn, of one episode, before a reset gives up
 
 
 class TaskEnvironment(composer.Environment):
@@ -50,9 +55,23 @@ class TaskEnvironment(composer.Environment):
         super().__init__(task, **arguments)
 
     def reset(self) -> dm_env.TimeStep:
-        """Start an episode."""
+        """Start an episode.
+
+        A start whose simulation diverges is drawn anew; the random state goes on from there.
+
+        Raises:
+          PhysicsError: None of a few starts came to rest.
+        """
         self.failure = self.failure_reason = ""
-        return self._kept(super().reset())
+        for attempt in range(1, _STARTS + 1):
+            try:
+                with self._physics.check_invalid_state():
+                    return self._kept(super().reset())
+            except PhysicsError as error:
+                if attempt == _STARTS:
+                    raise
+                log.warning("drawing the start anew: %s", str(error).splitlines()[0])
+        raise AssertionError
 
     def step(self, action: Any) -> dm_env.TimeStep:
         """Go on by one control step; after an episode's end, or before the first, reset."""

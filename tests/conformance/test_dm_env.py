@@ -8,6 +8,7 @@ import dm_env
 import numpy as np
 import pytest
 from absl.testing import absltest
+from dm_control.rl.control import PhysicsError
 from dm_env.test_utils import EnvironmentTestMixin
 from own_tasks import FATAL_STEP, diverging, registered
 
@@ -129,3 +130,26 @@ def test_a_diverging_simulation_ends_its_episode_and_leaves_nothing_to_the_next(
         for one, other in pairs:
             assert all(np.array_equal(v, other.observation[k]) for k, v in one.observation.items())
         assert np.array_equal(broken.physics.data.qpos, sound.physics.data.qpos)
+
+
+def test_a_start_that_diverges_is_drawn_anew(monkeypatch, caplog):
+    environment, sound = (suite.load(*TASK, seed=3) for _ in range(2))
+    task, fatal, states = environment.task, [True, True, False], []
+    place = task.place_objects
+
+    def place_or_fling(physics, random_state):
+        states.append(random_state.get_state())
+        place(physics, random_state)
+        if fatal.pop(0):
+            physics.data.qvel[-6:] = 1e12
+
+    monkeypatch.setattr(task, "place_objects", place_or_fling)
+    step = environment.reset()
+    assert step.first() and environment.failure == "" and fatal == []
+    assert caplog.text.count("drawing the start anew") == 2
+    sound.random_state.set_state(states[-1])
+    expected = sound.reset()
+    assert all(np.array_equal(v, step.observation[k]) for k, v in expected.observation.items())
+    fatal[:] = [True] * 5
+    with pytest.raises(PhysicsError):
+        environment.reset()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from dm_control import suite as dm_suite
 from episode_driver import HOLD
@@ -81,17 +84,32 @@ def test_the_time_limit_ends_the_episode():
     assert ended == [False] * 4 + [True]
 
 
-def test_dm_control_knows_the_tasks_once_registered():
+def test_dm_control_knows_the_tasks_once_registered(monkeypatch):
     manipose_mj.register_suite()
     manipose_mj.register_suite()
     assert len(set(dm_suite.ALL_TASKS)) == len(dm_suite.ALL_TASKS)
+    asked, settings = [], {"random": 7, "time_limit": 5.0, "observations": "state"}
+
+    def load(domain, task, seed, **options):
+        asked.append((domain, task, seed, options))
+        return SimpleNamespace(task=SimpleNamespace())
+
+    monkeypatch.setattr(suite, "load", load)
     for task in suite.ALL_TASKS:
         assert task in dm_suite.ALL_TASKS
-        own = suite.load(*task, seed=7).reset()
-        for _ in range(2):
-            theirs = dm_suite.load(*task, task_kwargs={"random": 7, "time_limit": 5.0})
-            step = theirs.reset()
-            assert step.observation.keys() == own.observation.keys()
-            assert all(np.array_equal(step.observation[k], v) for k, v in own.observation.items())
-            assert theirs.step(HOLD).reward in (0.0, 1.0)
+        dm_suite.load(*task, task_kwargs=settings)
+    options = {"environment_kwargs": {"time_limit": 5.0}, "observations": "state"}
+    assert asked == [(*task, 7, options) for task in suite.ALL_TASKS]
     assert dm_suite.load("cartpole", "balance").reset().first()
+
+
+@pytest.mark.parametrize("task", [TARGET_POSE, STORE], ids="/".join)
+def test_dm_control_loads_the_same_episodes(task):
+    manipose_mj.register_suite()
+    own = suite.load(*task, seed=7).reset()
+    for _ in range(2):
+        theirs = dm_suite.load(*task, task_kwargs={"random": 7, "time_limit": 5.0})
+        step = theirs.reset()
+        assert step.observation.keys() == own.observation.keys()
+        assert all(np.array_equal(step.observation[k], v) for k, v in own.observation.items())
+        assert theirs.step(HOLD).reward in (0.0, 1.0)
