@@ -127,8 +127,10 @@ def _one_frame(clouds: Sequence[LabelledCloud], frames: dict[str, SourceLabel]) 
     found = []
     for frame in frames.values():
         poses = np.stack([cloud.pose for cloud in clouds]) @ frame.T_label_source
-        found.append((pose_errors(poses, clouds, sources=frames).rotation.mean(), poses))
-    _, poses = min(found, key=lambda row: row[0])
+        errors = pose_errors(poses, clouds, sources=frames)
+        # Frames that differ in their origins only are equally good but for rounding.
+        found.append((round(errors.rotation.mean(), 4), errors.origin.mean(), poses))
+    _, _, poses = min(found, key=lambda row: row[:2])
     none = np.full(len(clouds), np.nan)
     return Answers(poses, none, float("nan"))
 
