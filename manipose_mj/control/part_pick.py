@@ -14,6 +14,7 @@ from manipose_mj.control.grasp_candidates import OPENING_MARGIN
 from manipose_mj.control.motion_planner import HANDLE_RETREATS, MotionPlanner, joint_motion
 from manipose_mj.control.part_holds import (
     Push,
+    grip_now,
     grips,
     opening_pushes,
     shifted,
@@ -95,6 +96,25 @@ def grip_handle(
     raise StageFailure(
         "plan",
         f"no grip of {part.name}'s handle works: {len(ways)} could move it, none can be approached",
+    )
+
+
+def way_in_hand(
+    planner: MotionPlanner, belief: Belief, part: PartBelief, opening: float
+) -> PartWay | None:
+    """The way to lead a part towards another opening by its handle, as the hand holds that now.
+
+    It may end short of `opening` [m or rad]; None if there is none at all.
+    """
+    hold, tilt = grip_now(part, planner.tcp_pose(belief.joints), belief.opening)
+    return find_way(
+        planner,
+        part,
+        hold,
+        opening,
+        near=belief.joints,
+        start=belief.joints,
+        start_tilt=tilt,
     )
 
 

@@ -17,12 +17,10 @@ from manipose_mj.control.grasp_candidates import (
     object_grasps,
     reachable,
 )
-from manipose_mj.control.motion_planner import (
-    MotionPlanner,
-    equivalent_poses,
-)
+from manipose_mj.control.lifting import ascents, carrying_path, equivalent_poses, find_place
+from manipose_mj.control.motion_planner import MotionPlanner
 from manipose_mj.control.part_pick import grip_handle
-from manipose_mj.control.planning_scene import CONTACT, Carried, carried_free_body
+from manipose_mj.control.planning_scene import CONTACT, Carried
 from manipose_mj.poses import invert, rotation_angle
 
 _STANDOFFS = (0.10, 0.06)
@@ -209,7 +207,7 @@ def _lift(
     carried = _carried(planner, grasps, index, thing)
     planner.scene.set_opening(float(grasps.widths[index]))
     way = way_out(belief, thing.label_pose[:3, 3])
-    return next(planner.ascents(joints, carried, way), None)
+    return next(ascents(planner, joints, carried, way), None)
 
 
 def _can_carry(
@@ -226,19 +224,19 @@ def _can_carry(
     carried = _carried(planner, grasps, index, thing)
     planner.scene.set_opening(float(grasps.widths[index]))
     pose_tcp = invert(grasps.tcp_poses[index]) @ thing.label_pose
-    place = planner.place(pose_tcp, destinations, thing.label.symmetry, carried, goal, way)
+    symmetry = thing.label.symmetry
+    place = find_place(planner, pose_tcp, destinations, symmetry, carried, goal, way)
     if place is None:
         return False
     risen = planner.tcp_pose(lift[-1])[2, 3] - planner.tcp_pose(lift[0])[2, 3]
     if risen > _ROOMY:
         return True
-    return planner.carrying_path(lift[-1], place.above, carried) is not None
+    return carrying_path(planner, lift[-1], place.above, carried) is not None
 
 
 def _carried(planner: MotionPlanner, grasps: Grasps, index: int, thing: ObjectBelief) -> Carried:
     """The object in the hand, as this grasp would hold it."""
-    pose_tcp = invert(grasps.tcp_poses[index]) @ thing.pose
-    return carried_free_body(planner.scene.model, thing.body, planner.free_joint(thing), pose_tcp)
+    return planner.held_at(thing, grasps.tcp_poses[index])
 
 
 def _approach(

@@ -12,24 +12,19 @@ from manipose_mj.control.cavity_mouth import way_out
 from manipose_mj.control.executor import Actions, Executor
 from manipose_mj.control.failure import StageFailure
 from manipose_mj.control.grasp_candidates import OPENING_MARGIN
-from manipose_mj.control.motion_planner import (
-    HANDLE_RETREATS,
-    RETREATS,
-    MotionPlanner,
-    Place,
-)
-from manipose_mj.control.part_holds import grip_now
-from manipose_mj.control.part_motion import find_way
+from manipose_mj.control.lifting import Place, ascents, carrying_path, find_place
+from manipose_mj.control.motion_planner import HANDLE_RETREATS, RETREATS, MotionPlanner
 from manipose_mj.control.part_pick import (
     MIN_SHARE,
     ending_free,
     off_surface,
     push_part,
     share_of,
+    way_in_hand,
 )
 from manipose_mj.control.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.plan import Step
-from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried, carried_free_body
+from manipose_mj.control.planning_scene import CONTACT, TRANSIT, Carried
 from manipose_mj.mjcf.panda import MAX_OPENING
 from manipose_mj.poses import invert, rotation_angle
 
@@ -145,12 +140,12 @@ class Primitives:
         pose_tcp = self._check_held(belief, name)
         thing, carried = belief.objects[name], self._carried(belief, name)
         way = way_out(belief, step.poses[0][:3, 3])
-        place = self._planner.place(
-            pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal, way
+        place = find_place(
+            self._planner, pose_tcp, step.poses, thing.label.symmetry, carried, pick.goal, way
         )
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
-        free = self._planner.carrying_path(belief.joints, place.above, carried)
+        free = carrying_path(self._planner, belief.joints, place.above, carried)
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
         yield from self._executor.follow(free)
@@ -172,7 +167,9 @@ class Primitives:
         carried = self._carried(belief, name)
         symmetry = belief.objects[name].label.symmetry
         way = way_out(belief, step.poses[0][:3, 3])
-        place = self._planner.place(pose_tcp, step.poses, symmetry, carried, belief.joints, way)
+        place = find_place(
+            self._planner, pose_tcp, step.poses, symmetry, carried, belief.joints, way
+        )
         if place is None:
             return None
         free = self._planner.free_path(belief.joints, place.above, carried=carried)
@@ -182,19 +179,12 @@ class Primitives:
         belief = self._executor.perceive()
         carried = self._carried(belief, name)
         way = way_out(belief, belief.objects[name].label_pose[:3, 3])
-        for lift in self._planner.ascents(belief.joints, carried, way):
+        for lift in ascents(self._planner, belief.joints, carried, way):
             return lift
         raise StageFailure("plan", f"no way to lift {name}")
 
     def _carried(self, belief: Belief, name: str) -> Carried:
-        thing = belief.objects[name]
-        inverse = invert(self._planner.tcp_pose(belief.joints))
-        return carried_free_body(
-            self._planner.scene.model,
-            thing.body,
-            self._planner.free_joint(thing),
-            inverse @ thing.pose,
-        )
+        return self._planner.held_at(belief.objects[name], self._planner.tcp_pose(belief.joints))
 
     def _move_part(self, step: Step, pick: PartPick) -> Actions:
         assert step.opening is not None
@@ -205,17 +195,7 @@ class Primitives:
 
     def _lead_part(self, belief: Belief, part: PartBelief, opening: float) -> Actions:
         """As far as the hand on the handle can lead it: a push may do the rest."""
-        tcp = self._planner.tcp_pose(belief.joints)
-        hold, tilt = grip_now(part, tcp, belief.opening)
-        way = find_way(
-            self._planner,
-            part,
-            hold,
-            opening,
-            near=belief.joints,
-            start=belief.joints,
-            start_tilt=tilt,
-        )
+        way = way_in_hand(self._planner, belief, part, opening)
         way = None if way is None else ending_free(self._planner, part, way)
         if way is None or share_of(way, part, opening) < MIN_SHARE[part.joint.kind]:
             raise StageFailure("plan", f"the arm cannot carry {part.name} far by its handle")

@@ -10,15 +10,8 @@ from jaxtyping import Bool, Float
 from manipose_mj.control.batch_ik import seeds_for, solve
 from manipose_mj.control.belief import Belief, PartBelief
 from manipose_mj.control.motion_planner import RETREATS, MotionPlanner, joint_motion
-from manipose_mj.control.part_holds import grip_now
-from manipose_mj.control.part_motion import find_way
-from manipose_mj.control.planning_scene import (
-    CONTACT,
-    GRAZING,
-    TRANSIT,
-    Carried,
-    carried_free_body,
-)
+from manipose_mj.control.part_pick import way_in_hand
+from manipose_mj.control.planning_scene import CONTACT, GRAZING, TRANSIT, Carried
 from manipose_mj.mjcf.panda import MAX_OPENING
 from manipose_mj.poses import invert, rotation_angle
 
@@ -158,16 +151,7 @@ class TcpPaths:
             for way in ways
         ]
         opening = float(openings[np.argmin(off)])
-        hold, tilt = grip_now(part, self._planner.tcp_pose(belief.joints), belief.opening)
-        way = find_way(
-            self._planner,
-            part,
-            hold,
-            opening,
-            near=belief.joints,
-            start=belief.joints,
-            start_tilt=tilt,
-        )
+        way = way_in_hand(self._planner, belief, part, opening)
         if way is None or abs(way.openings[-1] - opening) > 1e-6:
             return None
         return way.targets(self._timestep)
@@ -180,10 +164,7 @@ class TcpPaths:
         return mask
 
     def _carried(self, belief: Belief, name: str) -> Carried:
-        thing = belief.objects[name]
-        in_hand = invert(self._planner.tcp_pose(belief.joints)) @ thing.pose
-        joint = self._planner.free_joint(thing)
-        return carried_free_body(self._planner.scene.model, thing.body, joint, in_hand)
+        return self._planner.held_at(belief.objects[name], self._planner.tcp_pose(belief.joints))
 
 
 def _configurations(
