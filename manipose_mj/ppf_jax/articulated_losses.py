@@ -28,6 +28,7 @@ from manipose_mj.ppf_jax.symmetry import vote_cosines
 # Of a handle's two directions, the vote is for the one with this scalar product above zero; half a
 # turn of the body turns it as well. As labels have it: up, or for a level handle, with Z up.
 _RULE = np.array([0.0, 1.0, 0.5], np.float32)
+_NEAR = 0.25  # error of a frame that part votes can be asked for in [rad]
 _HANDLE_WEIGHT = 3.0  # of handle points in the classes' loss
 
 
@@ -41,7 +42,9 @@ class ArticulatedLoss:
       turn: Largest error of the body's frame before it is aligned, drawn evenly up to it [rad].
       unaligned: Share of the clouds whose frame is left as it is drawn.
       rolled: Share of the clouds whose frame is a quarter turn off about the front.
-      strange: Share of those whose frame has another side for the front: only the judge learns of them.
+      strange: Share of those whose frame may have another side for the front and be far off, as where an
+        open door is taken for the front: only the judge learns of what is.
+      far: Largest error of such a frame before it is aligned [rad].
     """
 
     pairs: int = 1000
@@ -49,7 +52,8 @@ class ArticulatedLoss:
     turn: float = float(np.radians(9.0))
     unaligned: float = 0.3
     rolled: float = 0.1
-    strange: float = 0.2
+    strange: float = 0.3
+    far: float = 0.8
 
     def __call__(
         self, model: ArticulatedModel, sample: FurnitureBatch, *, key: PRNGKeyArray
@@ -89,7 +93,7 @@ def varied(
 
     Returns:
       The cloud; what each point should vote for, by the names of `VOTES`; and `classes (n,)` int,
-      `moving (n,)` and `hinge (n,)` bool, and which of the `candidates` the frame is: 0 is the body's.
+      `moving (n,)` and `hinge (n,)` bool, whether the frame is `sound` enough to vote in and `right`.
     """
     keys = jax.random.split(key, 8)
     rotation = sample.body[:3, :3] @ BODY_IN_LABEL
@@ -97,17 +101,20 @@ def varied(
         jax.random.bernoulli(keys[0]), jnp.diag(jnp.array([1.0, -1.0, -1.0])), jnp.eye(3)
     )
     share = jax.random.uniform(keys[1])
-    other = jax.random.randint(keys[7], (), 2, CANDIDATES)
-    which = jnp.where(share < config.rolled, 1, 0)
-    which = jnp.where(share > 1 - config.strange, other, which)
+    strange = share > 1 - config.strange
+    other = jax.random.randint(keys[7], (), 0, CANDIDATES)
+    which = jnp.where(strange, other, jnp.where(share < config.rolled, 1, 0))
     towards = -unit(jnp.sum(sample.points, axis=0))
     turn = jax.random.normal(keys[2], (3,))
-    turn = turn / jnp.linalg.norm(turn) * jax.random.uniform(keys[3], maxval=config.turn)
+    most = jnp.where(strange, config.far, config.turn)
+    turn = turn / jnp.linalg.norm(turn) * most * jax.random.uniform(keys[3])
     right = candidates(rotation, towards)[which] @ half
     frame = right @ from_vector(turn)
     settled, _ = aligned(frame, sample.points, sample.normals, sample.mask)
     frame = jnp.where(jax.random.bernoulli(keys[6], config.unaligned), frame, settled)
-    off = jnp.swapaxes(frame, 0, 1) @ right
+    off = to_vector(jnp.swapaxes(frame, 0, 1) @ right)
+    # Where even the right front looks away from the camera, another stands for it.
+    near = (jnp.linalg.norm(off) < _NEAR) & (right[:, 0] @ rotation[:, 0] > 0.9)
     cloud, centre = body_cloud(sample.points, sample.normals, sample.mask, frame)
     sign = jnp.where(jax.random.bernoulli(keys[4]), 1.0, -1.0)
     mirror = jnp.stack([jnp.ones(()), jnp.ones(()), sign])
@@ -137,11 +144,13 @@ def varied(
         "line": to_line / LENGTH,
         "opening": opening[part][:, None],
         # A turning sense, too.
-        "turn": jnp.broadcast_to(to_vector(off) * mirror * sign / TURN, cloud.points.shape),
+        "turn": jnp.broadcast_to(off * mirror * sign / TURN, cloud.points.shape),
     }
     moving = sample.part >= 0
     classes = jnp.where(moving, 1 + sample.handle, 0)
-    known = {"classes": classes, "moving": moving, "hinge": sample.hinge[part], "which": which}
+    known = {"classes": classes, "moving": moving, "hinge": sample.hinge[part]}
+    # A frame that is rolled about the front is still good enough to vote in.
+    known |= {"sound": near, "right": near & (which != 1)}
     return cloud, targets, known
 
 
@@ -172,8 +181,6 @@ def part_losses(
         scale = votes.log_scale[name]
         loss = off * jnp.exp(-scale) + scale
         losses[name] = 0.5 * jnp.sum(counted * loss) / jnp.maximum(jnp.sum(counted), 1)
-    sound = known["which"] < 2
-    losses = {name: jnp.where(sound, loss, 0.0) for name, loss in losses.items()}
-    right = known["which"] == 0
-    losses["frame"] = jax.nn.softplus(jnp.where(right, -votes.frame, votes.frame))
+    losses = {name: jnp.where(known["sound"], loss, 0.0) for name, loss in losses.items()}
+    losses["frame"] = jax.nn.softplus(jnp.where(known["right"], -votes.frame, votes.frame))
     return losses

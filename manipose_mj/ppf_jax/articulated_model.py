@@ -38,6 +38,7 @@ class ArticulatedConfig:
       body_points: Points that it looks at.
       body_pairs: Votes at inference.
       normal_starts: Frames along normals that are tried besides those that pairs vote for.
+      apart: From which angle on two frames' axes are not the same [rad].
       network: Sizes of the part network.
       voting: How its votes are counted.
       points: Points that it looks at.
@@ -49,6 +50,7 @@ class ArticulatedConfig:
     body_points: int = 512
     body_pairs: int = 4096
     normal_starts: int = 8
+    apart: float = float(np.radians(6.0))
     network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
@@ -138,9 +140,9 @@ def estimate_parts(
     order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
     chosen = jnp.argsort(order)[: config.points]
     few = points[chosen], normals[chosen], mask[chosen]
-    settled = body_rotation(model, *few, key=body_key)
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
-    frames = candidates(settled, towards)
+    settled = body_rotations(model, *few, key=body_key)
+    frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     # What the part network sees in each of them; the likeliest is the body's.
     seen = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0]), frames)
     best = jnp.argmax(seen.frame)
@@ -166,17 +168,18 @@ def estimate_parts(
     return _in_camera(parts, rotation, centre, up, model.calibration)
 
 
-def body_rotation(
+def body_rotations(
     model: ArticulatedModel,
     points: Float[Array, "n 3"],
     normals: Float[Array, "n 3"],
     mask: Bool[Array, "n"],
     *,
     key: PRNGKeyArray,
-) -> Float[Array, "3 3"]:
-    """The body's axes in the camera frame: front, up or down and side as voted for, in that order or not.
+) -> Float[Array, "2 3 3"]:
+    """What the body's axes may be in the camera frame: front, up or down and side in any order.
 
-    From frames that the pairs vote for and others along normals, the one that most of the planes agree with.
+    Of frames that the pairs vote for and others along normals, the one that most of the planes agree with;
+    and of those with other axes the best, for an open door may be larger than what is seen of the body.
     """
     config = model.config
     sample_key, pair_key = jax.random.split(key)
@@ -186,7 +189,11 @@ def body_rotation(
     starts = jnp.concatenate([voted, normal_starts(normals, mask, config.normal_starts)])
     settled, score = jax.vmap(lambda start: aligned(start, points, normals, mask))(starts)
     # Where planes leave a turn open, votes decide: they come first.
-    return settled[jnp.argmax(score * jnp.linspace(1.0, 0.97, len(score)))]
+    score = score * jnp.linspace(1.0, 0.97, len(score))
+    first = settled[jnp.argmax(score)]
+    alike = jnp.abs(jnp.swapaxes(settled, 1, 2) @ first)
+    same = jnp.min(jnp.max(alike, axis=2), axis=1) > np.cos(config.apart)
+    return jnp.stack([first, settled[jnp.argmax(jnp.where(same, -1.0, score))]])
 
 
 def body_votes(
