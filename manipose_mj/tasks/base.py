@@ -50,7 +50,7 @@ class ManipulationTask(composer.Task):
         self.max_penetration = 0.0
         self._reader: SceneReader | None = None
         self._action_shape = options.action_mode.spec().shape
-        self._substep, self._substeps = 0, self.physics_steps_per_control_step
+        self._substep, self._substeps = 0, 1
         self._randomiser = Randomiser(randomisation(options.randomisation))
         self._delay = Delay()
         self._target = np.zeros(8)
@@ -188,6 +188,7 @@ class ManipulationTask(composer.Task):
         physics.data.time = 0.0
         self.options.action_mode.reset(physics, self.robot)
         self._action_shape = self.options.action_mode.spec().shape  # the mode may have been changed
+        self._substeps = self.physics_steps_per_control_step
         self.success_now = self.success_once = False
         self.max_penetration = 0.0
         # Drawn whatever the sensors: the next episode shall not depend on what is observed.

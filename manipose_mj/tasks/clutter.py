@@ -22,7 +22,12 @@ from manipose_mj.tasks.options import TaskConfig, TaskOptions
 from manipose_mj.tasks.pile import Pile
 from manipose_mj.tasks.pile_cache import PileCache
 from manipose_mj.tasks.pile_layout import PileConfig
-from manipose_mj.tasks.pile_scene import IMPRATIO, NOSLIP_ITERATIONS
+from manipose_mj.tasks.pile_scene import (
+    IMPRATIO,
+    NOSLIP_ITERATIONS,
+    PILE_CONTACT_TIME,
+    PILE_TIMESTEP,
+)
 from manipose_mj.tasks.resting import pose_on_table, require_graspable
 
 TARGET_NAMES = ("object", "object_second", "object_third")
@@ -58,8 +63,8 @@ class ClutterConfig(TaskConfig):
 class Clutter(ManipulationTask):
     """A pile and goals beside it. A subclass says which objects of a pile may be the targets.
 
-    Physics as in the other tasks, but friction is held by a stiffer constraint instead of the
-    no-slip solver, for speed.
+    Physics as in the other tasks, but in steps half as long, with contacts twice as stiff; and friction
+    is held by a stiffer constraint instead of the no-slip solver, for speed.
 
     Attributes:
       buried: Whether others may have to be moved before the target can be taken.
@@ -85,7 +90,11 @@ class Clutter(ManipulationTask):
         self._arena.mjcf_model.option.set_attributes(
             impratio=IMPRATIO, noslip_iterations=NOSLIP_ITERATIONS, sleep_tolerance=_SLEEP_SPEED
         )
+        # The native one overstates how deep cylinders reach into boxes beside them, 7 mm for 1.
+        self._arena.mjcf_model.option.flag.nativeccd = "disable"
+        self.physics_timestep = PILE_TIMESTEP
         self._pool = ObjectPool(assets, self._arena)
+        self._stiffen_contacts()
         self._instances.update({e.mjcf_model.model: e for e in self._pool.entities})
         self._markers = [
             GoalMarker(name=f"goal_{name}") for name in TARGET_NAMES[: config.targets[1]]
@@ -98,6 +107,13 @@ class Clutter(ManipulationTask):
         self._used: tuple[int, ...] = tuple(range(self._largest))
         self._goal_poses: tuple[Float[np.ndarray, "4 4"], ...] = ()
         self._finish_build()
+
+    def _stiffen_contacts(self) -> None:
+        geoms = [self._arena.mjcf_model.find("geom", "table")]
+        for entity in self._pool.entities:
+            geoms += [g for g in entity.mjcf_model.find_all("geom") if g.solref is not None]
+        for geom in geoms:
+            geom.solref = [PILE_CONTACT_TIME, 1.0]
 
     @abc.abstractmethod
     def _choose(

@@ -23,6 +23,7 @@ _DROP_SPEED = 0.5  # downwards, to begin with [m/s]
 _FALL_TIME = 0.4  # until the next one falls [s]
 _REST_TIME = 4.0  # for the pile to come to rest without walls [s]
 _STILL_TIME = 0.2  # for which it then has to be still [s]
+_CALM_TIME = 0.6  # for a pile at rest to be so in fine steps too [s]
 _STILL = (0.0005, 0.005)  # [m/s, rad/s]; friction that creeps turns things faster
 _PENETRATION = 0.002  # allowed in a pile at rest [m]
 
@@ -87,7 +88,10 @@ def _dropped(assets: Sequence[Asset], config: PileConfig, rng: np.random.Generat
         scene.drop(order, drop.rotation, drop.xy, _DROP_GAP, _DROP_SPEED)
         scene.run(_FALL_TIME)
     scene.remove_walls()
-    still = scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread)
+    if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread):
+        return None
+    scene.step_finely()
+    still = scene.rest(_CALM_TIME, _STILL_TIME, _STILL, config.spread)
     kept = np.flatnonzero(scene.kept)
     if not still or len(kept) < config.count[0] or scene.penetration() > _PENETRATION:
         return None

@@ -15,9 +15,7 @@ def test_random_actions_neither_break_the_physics_nor_push_things_through(blind,
         step = blind.step(rng.uniform(spec.minimum, spec.maximum))
         assert not step.last()
         assert np.isfinite(blind.physics.data.qpos).all()
-    # Between things under a blow of the arm in a pile, 6.8 mm were seen: more than the 5 mm we want.
-    piled = len(blind.task.movable) > 2
-    assert blind.task.max_penetration < (0.008 if piled else 0.005)
+    assert blind.task.max_penetration < 0.005
 
 
 def test_slow_random_motions_touch_without_sinking_in(blind):
