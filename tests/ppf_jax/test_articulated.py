@@ -319,3 +319,21 @@ def test_body_columns_are_front_up_and_side(cabinet):
     np.testing.assert_allclose(rotation[:, 0], [-1, 0, 0], atol=1e-6)
     np.testing.assert_allclose(rotation[:, 1], [0, 0, 1], atol=1e-6)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_training_steps_have_gradients_for_every_weight(estimator, sample):
+    few = jax.tree.map(lambda leaf: leaf, sample)
+    few = dataclasses.replace(
+        few, **{n: getattr(few, n)[:128] for n in ("points", "normals", "mask", "part", "handle")}
+    )
+    loss = ArticulatedLoss(pairs=50, strange=0.0)
+
+    def total(model, key):
+        return loss(model, few, key=key)[0]
+
+    gradient = jax.jit(jax.grad(total))(estimator.model, KEY)
+    leaves = jax.tree.leaves_with_path(gradient)
+    assert all(np.isfinite(leaf).all() for _, leaf in leaves)
+    still = [jax.tree_util.keystr(path) for path, leaf in leaves if not np.any(leaf)]
+    # Extents are not asked for, and confidence is fitted afterwards.
+    assert all("size" in name or "calibration" in name for name in still), still
