@@ -14,6 +14,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.articulated_subject import JointLabel
 from manipose_mj.ppf_jax.articulated_views import FurnitureView
+from manipose_mj.ppf_jax.view_settings import TASK_FOVY
 
 Array = Any  # a NumPy or a JAX array
 
@@ -57,6 +58,8 @@ class FurnitureCloud:
       handle: `(n,)`, whether the point is on that part's handle.
       pose: `(4, 4)`, `T_camera_object`.
       handle_pixels: `(parts,)`, how many measured pixels show each handle, as if of 480 rows.
+      handle_framed: `(parts,)`, whether both ends of each handle are within some camera's image.
+      axis_framed: `(parts,)`, whether the point of each joint's axis that is nearest to the handle is.
     """
 
     scene: FurnitureScene
@@ -66,6 +69,8 @@ class FurnitureCloud:
     handle: Bool[np.ndarray, "n"]
     pose: Float[np.ndarray, "4 4"]
     handle_pixels: Int[np.ndarray, "parts"]
+    handle_framed: Bool[np.ndarray, "parts"]
+    axis_framed: Bool[np.ndarray, "parts"]
 
 
 @jax.tree_util.register_dataclass
@@ -127,6 +132,7 @@ def fused_cloud(
         points.append(transform(T_first_own, view.points.astype(float)))
         normals.append(view.normals @ T_first_own[:3, :3].T)
     rows = rng.permutation(sum(len(view.points) for view in views))[:CLOUD_POINTS]
+    ends, feet = _landmarks(scene)
     return FurnitureCloud(
         scene=scene,
         points=np.concatenate(points)[rows].astype(np.float32),
@@ -135,7 +141,32 @@ def fused_cloud(
         handle=np.concatenate([view.handle for view in views])[rows],
         pose=pose,
         handle_pixels=np.sum([view.handle_pixels for view in views], axis=0),
+        handle_framed=np.any([_framed(view, ends).all(axis=1) for view in views], axis=0),
+        axis_framed=np.any([_framed(view, feet) for view in views], axis=0),
     )
+
+
+def _landmarks(
+    scene: FurnitureScene,
+) -> tuple[Float[np.ndarray, "parts 2 3"], Float[np.ndarray, "parts 3"]]:
+    """Both ends of every handle, and the nearest point of its joint's axis; of a slide, the handle's centre."""
+    ends, feet = np.zeros((len(scene.joints), 2, 3)), np.zeros((len(scene.joints), 3))
+    for i, (joint, opening) in enumerate(zip(scene.joints, scene.openings, strict=True)):
+        pose = joint.motion(opening) @ joint.handle
+        half = 0.5 * joint.handle_extents[0] * pose[:3, 0]
+        ends[i] = pose[:3, 3] + half, pose[:3, 3] - half
+        feet[i] = pose[:3, 3]
+        if joint.hinge:
+            feet[i] = joint.origin + ((feet[i] - joint.origin) @ joint.axis) * joint.axis
+    return ends, feet
+
+
+def _framed(view: FurnitureView, points: Float[np.ndarray, "*b 3"]) -> Bool[np.ndarray, "*b"]:
+    """Whether points of the object frame are within the image of a view."""
+    flat = transform(view.pose.astype(float), points.reshape(-1, 3))
+    half = np.tan(0.5 * TASK_FOVY) * np.array([4 / 3, 1.0])
+    inside = (np.abs(flat[:, :2]) < half * flat[:, 2:]).all(axis=1)
+    return inside.reshape(points.shape[:-1])
 
 
 def handle_poses(cloud: FurnitureCloud) -> Float[np.ndarray, "parts 4 4"]:

@@ -13,7 +13,8 @@ from manipose_mj.poses import pose_error, transform
 from manipose_mj.ppf_jax.articulated_clouds import FurnitureCloud, handle_poses
 from manipose_mj.ppf_jax.articulated_estimator import PartEstimate
 
-# A handle that at least so many measured pixels show, of an image of 480 rows, counts as visible.
+# A handle both of whose ends are within the image and that at least so many measured pixels show, of 480 rows,
+# counts as visible.
 VISIBLE_PIXELS = 40
 CENTRE_BAR, LINE_BAR = 0.015, 0.02  # [m]
 ANGLE_BAR = float(np.radians(5.0))
@@ -27,6 +28,7 @@ class PartErrors:
     Attributes:
       name: The cloud and the part.
       hinge: Whether the part turns.
+      axis_visible: Whether the joint's axis is within the image where it is nearest to the handle.
       centre: Of the handle [m].
       axes: Of the handle's rotation, the least over its symmetry group [rad].
       type_right: Whether the joint's type is.
@@ -39,6 +41,7 @@ class PartErrors:
 
     name: str
     hinge: bool
+    axis_visible: bool
     centre: float
     axes: float
     type_right: bool
@@ -61,7 +64,7 @@ class PartErrors:
 def part_errors(
     cloud: FurnitureCloud, estimates: Sequence[PartEstimate], *, least_pixels: int = VISIBLE_PIXELS
 ) -> tuple[list[PartErrors], int]:
-    """Errors for every part whose handle a cloud shows, and how many estimates are of no handle at all.
+    """Errors for every part whose handle a cloud shows (all parts if `least_pixels` is 0), and how many estimates are of no handle at all.
 
     Estimates and handles are paired so that the distances' sum is least. An estimate may also be of a
     handle that hardly shows; that counts neither way.
@@ -74,12 +77,13 @@ def part_errors(
     strange = len(estimates) - len(matched)
     errors = []
     for i, joint in enumerate(scene.joints):
-        if cloud.handle_pixels[i] < least_pixels:
+        if cloud.handle_pixels[i] < least_pixels or (least_pixels and not cloud.handle_framed[i]):
             continue
+        shown = bool(cloud.axis_framed[i])
         name = f"{scene.name} {joint.name}"
         if i not in matched:
             inf = float("inf")
-            errors.append(PartErrors(name, joint.hinge, inf, inf, False, inf, inf, inf, 0.0))
+            errors.append(PartErrors(name, joint.hinge, shown, inf, inf, False, inf, inf, inf, 0.0))
             continue
         estimate = estimates[matched[i]]
         centre, axes = pose_error(estimate.handle.astype(float), truth[i], joint.symmetry)
@@ -97,6 +101,7 @@ def part_errors(
             PartErrors(
                 name=name,
                 hinge=joint.hinge,
+                axis_visible=shown,
                 centre=float(centre),
                 axes=float(axes),
                 type_right=right,
@@ -110,7 +115,7 @@ def part_errors(
 
 
 def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str, float | int]:
-    """Figures of a table's row: cm, degrees, shares from 0 to 1.
+    """Figures of a table's row: cm, degrees, shares from 0 to 1; of joints, those whose axis is visible.
 
     Args:
       errors: Of all parts that show.
@@ -129,7 +134,8 @@ def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str
     def median(values: Sequence[float]) -> float:
         return float(np.median(values)) if len(values) else float("nan")
 
-    hinges = [e for e in errors if e.hinge]
+    hinges = [e for e in errors if e.hinge and e.axis_visible]
+    joints = [e for e in errors if e.axis_visible]
     slides = [e for e in errors if not e.hinge]
     return {
         "n": len(errors),
@@ -140,8 +146,8 @@ def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str
         "direction_within": share([e.direction <= ANGLE_BAR for e in errors]),
         "line_within": share([e.line <= LINE_BAR for e in hinges]),
         "handle_right": share([e.handle_right for e in errors]),
-        "joint_right": share([e.joint_right for e in errors]),
-        "all_right": share([e.handle_right and e.joint_right for e in errors]),
+        "joint_right": share([e.joint_right for e in joints]),
+        "all_right": share([e.handle_right and e.joint_right for e in joints]),
         "centre_cm_median": 100 * median([e.centre for e in errors]),
         "axes_deg_median": float(np.degrees(median([e.axes for e in errors]))),
         "direction_deg_median": float(np.degrees(median([e.direction for e in errors]))),
