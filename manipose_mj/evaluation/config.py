@@ -61,6 +61,12 @@ class EvaluationConfig:
             frozen.seed(task, self.episodes - 1)
 
     @property
+    def poses(self) -> dict[str, str]:
+        """What of a scene the baseline knows truly and what by estimates, for reports."""
+        objects = "estimated" if self.pose == "estimated" else "true"
+        return {"objects": objects, "furniture": "true"}
+
+    @property
     def split(self) -> str:
         """Which built-in objects the episodes use."""
         return "train" if self.protocol is None else "test"

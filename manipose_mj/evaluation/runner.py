@@ -270,6 +270,7 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
+    settings["poses"] = config.poses
     return {
         "tasks": summarize(results),
         "versions": versions(),

@@ -55,6 +55,10 @@ def summarize_task(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "median_wall_s": median(r.wall_s for r in results),
         "median_translation_error_m": _median(r.translation_error for r in results),
         "median_rotation_error_rad": _median(r.rotation_error for r in results),
+        "median_estimate_translation_error_m": _median(
+            r.estimate_translation_error for r in results
+        ),
+        "median_estimate_rotation_error_rad": _median(r.estimate_rotation_error for r in results),
         "max_penetration_m": max(r.max_penetration for r in results),
         "seeds": [r.seed for r in results],
     }

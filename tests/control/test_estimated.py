@@ -19,6 +19,7 @@ from manipose_mj.control.pick import pick_object
 from manipose_mj.control.plan import plan_to_json
 from manipose_mj.control.planner import make_plan
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.mjcf.objects import RigidObject
 from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.ppf_jax.estimator import PoseEstimate
@@ -227,3 +228,10 @@ def test_known_shapes_are_in_their_label_frames(category):
 
 def test_sensors_are_noisy():
     assert SENSORS.depth_sensor is not None
+
+
+@pytest.mark.parametrize("pose", ["oracle", "estimated"])
+def test_reports_say_which_poses_were_estimated(cup, pose, tmp_path):
+    config = EvaluationConfig((TARGET_POSE,), tmp_path, pose=pose)
+    assert dict(Baseline(cup, pose).senses.sources) == config.poses
+    assert config.poses["objects"] == {"oracle": "true", "estimated": "estimated"}[pose]
