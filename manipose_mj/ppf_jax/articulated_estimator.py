@@ -124,7 +124,7 @@ class ArticulatedEstimator:
         return [_parts(row, least) for row in estimate_rows(self.model, clouds, key=key, up=up)]
 
 
-_COLUMNS = ("handle", "hinge", "axis_origin", "axis", "opening", "confidence", "evidence")
+_COLUMNS = ("handle", "hinge", "axis_origin", "axis", "opening", "confidence", "evidence", "body")
 Row = dict[str, np.ndarray]
 
 

@@ -143,11 +143,12 @@ def estimate_parts(
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
     settled = body_rotations(model, *few, key=body_key)
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
-    # What the part network sees in each of them; the likeliest is the body's.
-    seen = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0]), frames)
-    best = jnp.argmax(seen.frame)
-    rotation, votes = frames[best], jax.tree.map(lambda leaf: leaf[best], seen)
+    rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
+    # The likeliest of them is the body's.
+    logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)
+    rotation = frames[jnp.argmax(logits)]
     cloud, centre = body_cloud(*few, rotation)
+    votes = model.parts(cloud, rows)
     first = find_parts(cloud, votes, config.voting)
     turn = from_vector(frame_turn(cloud, votes, config.voting))
     # The second time, half of the points are from where handles seem to be.

@@ -160,14 +160,23 @@ class PartNetwork(eqx.Module):
         self.judge_hidden = Dense(2 * width, config.hidden, rng=rng)
         self.judge = Dense(config.hidden, 1, rng=rng, gain=0.1)
 
-    def __call__(self, cloud: BodyCloud) -> PointVotes:
-        """The votes of every point."""
+    def neighbours(self, cloud: BodyCloud) -> tuple[Int[Array, "n k"], ...]:
+        """The points that each layer looks at, whatever the frame of the cloud."""
+        config, count = self.config, len(cloud.mask)
+        return tuple(
+            nearest_rows(cloud, min(among, count), config.neighbours) for among in config.among
+        )
+
+    def __call__(
+        self, cloud: BodyCloud, neighbours: tuple[Int[Array, "n k"], ...] | None = None
+    ) -> PointVotes:
+        """The votes of every point; `neighbours` saves looking for them again in another frame."""
         config = self.config
+        neighbours = self.neighbours(cloud) if neighbours is None else neighbours
         known = jnp.concatenate([cloud.points / 0.3, cloud.normals, cloud.views], axis=-1)
         known = jax.nn.relu(self.first(known))
         seen = []
-        for layer, among, reach in zip(self.layers, config.among, config.reach, strict=False):
-            others = nearest_rows(cloud, min(among, len(known)), config.neighbours)
+        for layer, others, reach in zip(self.layers, neighbours, config.reach, strict=False):
             known = layer(known, cloud, others, reach)
             seen.append(known)
         known = self.layers[-1](known, cloud, None, 0.4, anchors=config.anchors)
