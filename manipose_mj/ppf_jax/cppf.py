@@ -22,6 +22,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.clouds import CloudBatch, LabelledCloud
 from manipose_mj.ppf_jax.cppf_voting import (
+    EXACT,
     CppfConfig,
     CppfOutputs,
     directed,
@@ -125,7 +126,8 @@ class CppfModel(eqx.Module):
     ) -> Float[Array, "n width"]:
         """Features of the points."""
         squares = jnp.sum(points**2, axis=-1)
-        distances = squares[:, None] + squares[None] - 2 * points @ points.T
+        products = jnp.matmul(points, points.T, precision=EXACT)
+        distances = squares[:, None] + squares[None] - 2 * products
         distances = jnp.where(mask[None], distances, jnp.inf)
         nearest, rows = jax.lax.top_k(-distances, min(self.config.neighbours, len(points)))
         # A cloud with fewer points: each is its own neighbour in place of padding.
@@ -211,7 +213,7 @@ class CppfLoss:
         folded = (config.symmetry.unsigned_x, config.symmetry.unsigned_y)
         for i, (name, fold) in enumerate(zip("xy", folded, strict=True)):
             axis = sample.pose[:3, i]
-            cosine = jnp.clip(along @ axis, -0.999999, 0.999999)
+            cosine = jnp.clip(jnp.matmul(along, axis, precision=EXACT), -0.999999, 0.999999)
             angle = jnp.arccos(jnp.abs(cosine) if fold else cosine)
             sign = optax.sigmoid_binary_cross_entropy(out.signs[:, i], facing @ axis > 0)
             loss = _divergence(out.angles[:, i], angle, jnp.pi) + jnp.mean(sign)
