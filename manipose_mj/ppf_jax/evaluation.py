@@ -57,7 +57,7 @@ def answers(
       seed: Of what the estimator draws; each cloud's share depends on its place in the list.
       timed: Clouds that are estimated once more, one by one, for the time; NaN if none are.
     """
-    found = []
+    found, batch = [], min(batch, len(clouds))
     for start in range(0, len(clouds), batch):
         some = list(clouds[start : start + batch])
         # The last batch is filled up, so that all have one shape.
