@@ -9,18 +9,17 @@ from importlib import resources
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
-from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, estimate_batch
+from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, PoseModel, estimate_batch
 from manipose_mj.ppf_jax.outliers import not_alone
 from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load_weights
 
@@ -131,8 +130,17 @@ class PoseEstimator:
           InputError: The cloud is no cloud of an object in metres; one line says why.
         """
         points, normals = _checked(cloud, key)
-        padded = _padded(points, normals, bucket(len(points)))
-        return _as_estimate(_estimate(self.trained.model, *map(jnp.asarray, padded), key=key))
+        size, model = bucket(len(points)), self.trained.model
+        if normals is None:
+            normals = np.zeros_like(points)
+            rows = np.arange(len(points))
+            if isinstance(model, PoseModel):
+                # Normals take longer than all else outside the networks: only where one looks.
+                looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
+                rows = looked_at[looked_at < len(points)]
+            normals[rows] = cloud_normals(points, rows)
+        padded = _padded(points, normals, size)
+        return _as_estimate(_estimate(model, *padded, key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -147,7 +155,8 @@ class PoseEstimator:
         checked = []
         for number, cloud in enumerate(clouds):
             try:
-                checked.append(_checked(cloud, jax.random.fold_in(key, number)))
+                points, normals = _checked(cloud, jax.random.fold_in(key, number))
+                checked.append((points, cloud_normals(points) if normals is None else normals))
             except InputError as error:
                 raise InputError(f"cloud {number}: {error}") from None
         size = bucket(max(len(points) for points, _ in checked))
@@ -162,7 +171,8 @@ def bucket(count: int) -> int:
     return next(size for size in BUCKETS if count <= size)
 
 
-@eqx.filter_jit
+# Not `eqx.filter_jit`: every leaf is an array, and sorting that out takes a millisecond a call.
+@jax.jit
 def _estimate(
     model: EstimatingModel,
     points: Float[Array, "n 3"],
@@ -174,8 +184,13 @@ def _estimate(
     return model.estimate(points, normals, mask, key=key)
 
 
-def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
-    """At most `MAX_POINTS` points and their unit normals, towards the camera."""
+@jax.jit
+def _looks_at(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "m"]:
+    return model.looks_at(mask, key=key)
+
+
+def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:
+    """At most `MAX_POINTS` points and their unit normals, towards the camera; None without any."""
     oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
     points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
@@ -210,7 +225,7 @@ def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray
     if normals is None:
         kept = not_alone(points)
         points = points[kept] if kept.sum() >= MIN_POINTS else points
-        return points, cloud_normals(points)
+        return points, None
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.maximum(lengths, 1e-9)
     away = np.sum(normals * points, axis=1, keepdims=True) > 0

@@ -76,8 +76,13 @@ def sampled(
     key: PRNGKeyArray,
 ) -> tuple[Float[Array, "count 3"], Float[Array, "count 3"], Bool[Array, "count"]]:
     """`count` random rows of a cloud, its points before its padding."""
-    order = jnp.argsort(jax.random.uniform(key, mask.shape) + 2.0 * ~mask)[:count]
+    order = sampled_rows(mask, count=count, key=key)
     return points[order], normals[order], mask[order]
+
+
+def sampled_rows(mask: Bool[Array, "n"], *, count: int, key: PRNGKeyArray) -> Int[Array, "count"]:
+    """The rows that `sampled` takes."""
+    return jnp.argsort(jax.random.uniform(key, mask.shape) + 2.0 * ~mask)[:count]
 
 
 def pair_features(

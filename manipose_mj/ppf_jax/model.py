@@ -9,11 +9,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.clouds import SAMPLE_POINTS
-from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
+from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled, sampled_rows
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.refinement import (
     CONFIDENT_LEVEL,
@@ -92,6 +92,11 @@ class PoseModel(eqx.Module):
     ) -> Estimates:
         """`estimate_cloud` with this model."""
         return estimate_cloud(self, points, normals, mask, key=key)
+
+    def looks_at(self, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "sample"]:
+        """The rows of a cloud that `estimate` looks at: the rest needs no normals."""
+        sample_key = jax.random.split(key, 3)[0]
+        return sampled_rows(mask, count=self.config.points, key=sample_key)
 
 
 class Estimates(eqx.Module):
