@@ -1,0 +1,65 @@
+"""The pose table's rows say what was measured, and what is missing is named and left out."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipose_mj.poses import SymmetryGroup, compose, rotation_about
+from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.metrics import pose_errors
+from manipose_mj.ppf_jax.source_frames import SourceLabel
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def table():
+    sys.path.insert(0, str(BENCHMARKS))  # it loads its neighbours
+    try:
+        return importlib.import_module("pose_table")
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+
+
+def cloud(name: str, pose: np.ndarray) -> LabelledCloud:
+    zeros, extents = np.zeros((40, 3), np.float32), np.ones(3, np.float32)
+    group = SymmetryGroup.identity()
+    return LabelledCloud(zeros, zeros, pose.astype(np.float32), extents, group, name, "thing")
+
+
+def test_one_frame_for_all_is_the_one_that_suits_most(table):
+    turned = compose(rotation_about(np.eye(3)[2], np.pi / 2), np.array([0.0, 0.0, 0.1]))
+    frames = {
+        name: SourceLabel("PACE", frame, np.ones(3), SymmetryGroup.identity())
+        for name, frame in (("a", turned), ("b", np.eye(4)), ("c", np.eye(4)))
+    }
+    poses = [compose(rotation_about(np.eye(3)[0], i), np.array([0.0, 0.0, 0.7])) for i in range(3)]
+    clouds = [cloud(f"{name}/0", pose) for name, pose in zip("abc", poses, strict=True)]
+    found = table._one_frame(clouds, frames)
+    errors = pose_errors(found.poses, clouds, sources=frames)
+    np.testing.assert_allclose(np.degrees(errors.rotation), [90, 0, 0], atol=0.05)
+    np.testing.assert_allclose(errors.origin, [0.1, 0, 0], atol=1e-6)
+
+
+def test_weights_that_are_not_there_are_named_and_left_out(table, tmp_path, caplog):
+    assert table._estimator("cup", None, "cppf", "unified") is None
+    assert not caplog.records  # the package has none: nothing was asked for
+    assert table._estimator("cup", tmp_path, "cppf", "original") is None
+    assert "cup-cppf-original/weights.npz: no such file" in caplog.text
+    assert table._estimator("cup", tmp_path, "ours", "unified").trained.method == "ours"
+
+
+def test_the_table_holds_rows_with_and_without_figures(table):
+    rows = [table._row("cup", "paper", "unified", {"origin_cm_mean": 0.57, "deg_mean": 4.1})]
+    assert rows[0]["n"] is None and rows[0]["deg_median"] is None
+    figures = {"origin_cm_mean": 1.0, "origin_cm_median": 0.9, "deg_mean": 3.0, "deg_median": 2.0}
+    figures |= {f"recall_{d}deg_{c}cm": 0.5 for d, c in table.SHOWN_RECALLS} | {"flipped": 0.25}
+    rows.append(table._row("cup", "some", "unified", {**figures, "ms_per_object": np.nan, "n": 4}))
+    assert rows[1]["ms_per_object"] is None
+    assert table.table_of(rows, "anywhere").row_count == 2
+    assert "50 50 50" in table._cell(rows[1]) and "flipped 25.0%" in table._cell(rows[1])
