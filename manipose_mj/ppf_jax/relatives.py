@@ -24,8 +24,8 @@ def relatives(symmetry: CommonSymmetry) -> Float[np.ndarray, "r 3 3"]:
     """Turns in the label frame, `rotation @ relative`; not the identity.
 
     An axis of revolution can be upside down, a box can have any axis for any other; everything else
-    can be upside down, back to front, or turned about X, and have any axis for any other where there are
-    boxes among it.
+    can be upside down, back to front, or turned about X, and have any axis, either way, for any other
+    where there are boxes among it: a camera or a clock is then mistaken for one.
 
     Args:
       symmetry: What makes frames equivalent.
@@ -57,6 +57,9 @@ def _candidates(symmetry: CommonSymmetry) -> list[Float[np.ndarray, "3 3"]]:
     exchanged = [each * np.linalg.det(each) for each in axes]
     if symmetry.unsigned_x and symmetry.unsigned_y:
         return exchanged
-    turns = [rotation_about(_X, 2 * np.pi * i / _TURNS) for i in range(1, _TURNS)]
-    turns = [rotation_about(_Y, np.pi), rotation_about(_Z, np.pi), *turns]
-    return turns + exchanged if symmetry.boxes else turns
+    half_turns = [rotation_about(axis, np.pi) for axis in (_Y, _Z)]
+    turns = half_turns + [rotation_about(_X, 2 * np.pi * i / _TURNS) for i in range(1, _TURNS)]
+    if not symmetry.boxes:
+        return turns
+    every_half_turn = [np.eye(3), rotation_about(_X, np.pi), *half_turns]
+    return turns + [each @ half for each in exchanged for half in every_half_turn]
