@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,6 +55,18 @@ def test_a_carton_with_a_front_is_none_of_the_boxes(table):
     assert not table.fits(SymmetryGroup.identity(), boxes)
     assert table.fits(SymmetryGroup.identity(), PoseEstimator.load("hammer"))
     assert not table.fits(SymmetryGroup.identity(), PoseEstimator.load("cup"))
+
+
+def test_turns_about_the_axis_count_where_the_category_has_a_side(table):
+    def scan(category, object_type, group):
+        label = SimpleNamespace(object_type=object_type, symmetry=group)
+        return SimpleNamespace(category=category, label=label)
+
+    own = SymmetryGroup.identity()
+    assert table.kind_symmetry(scan("screwdriver", "functional", own)).axial
+    assert table.kind_symmetry(scan("hammer", "functional", own)) is own
+    assert table.kind_symmetry(scan("bottle", "mirror", own)) is own  # an oval one
+    assert table.kind_symmetry(scan("banana", "mirror", own)) is own
 
 
 def test_the_worst_views_are_drawn_worst_first(table, tmp_path):
