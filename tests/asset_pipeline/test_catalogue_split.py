@@ -26,4 +26,6 @@ def test_every_common_style_is_in_both_splits(category):
         )
     for style in counts["train"].keys() | counts["test"].keys():
         train, test = counts["train"][style], counts["test"][style]
-        assert train + test < 8 or (train and test), f"{style}: {train} for training, {test} for tests"
+        assert train + test < 8 or (train and test), (
+            f"{style}: {train} for training, {test} for tests"
+        )
