@@ -38,7 +38,6 @@ from asset_pipeline.repair import closed, weld
 from asset_pipeline.sources import ycb
 from manipose_mj.evaluation.statistics import machine
 
-GROUP = 4  # objects of one turn
 POINTS = 200_000  # on each surface: about 0.5 mm apart
 
 
@@ -72,14 +71,15 @@ def main() -> None:
         f"coacd {version('coacd')}, mujoco {mujoco.__version__}"
     )
     _print_head()
+    turn = 2 * arguments.jobs  # objects
     rows: dict[str, tuple[Fidelity, Fidelity]] = {}
     seconds = np.zeros(2)
     with tempfile.TemporaryDirectory(prefix="pipeline-") as scratch:
         os.environ[CACHE_VARIABLE] = f"{scratch}/cache"
-        for first in range(0, len(items), GROUP):
+        for first in range(0, len(items), turn):
             root = Path(scratch) / str(first)
             scans = {}
-            for item in items[first : first + GROUP]:
+            for item in items[first : first + turn]:
                 with ycb.opened(item) as scan:
                     scans[item.name] = scan.mesh
                     _stage_for_obj2mjcf(item.name, scan.texture, root / "theirs")
