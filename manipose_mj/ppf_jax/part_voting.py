@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from manipose_mj.ppf_jax.part_network import LENGTH, SLIDE_LENGTH, TURN, BodyCloud, PointVotes
 
 EVIDENCE = 4
+_PANEL = 0.05  # weight of points that are not on a handle where centres are looked for
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class PartVotingConfig:
       width: Of the kernel that counts voted centres together [m].
       separation: Between handles, at least [m].
       reach: How far from a part's centre a point may vote to take part in the part's estimate [m].
+      snap: Directions that are this near to an axis of the body, or of the joint, are along it [rad].
+      panel: Weight of votes for a handle's centre from points that are not on one.
       rounds: Of reweighting.
     """
 
@@ -32,6 +36,8 @@ class PartVotingConfig:
     width: float = 0.015
     separation: float = 0.04
     reach: float = 0.06
+    snap: float = float(np.radians(20.0))
+    panel: float = 0.01
     rounds: int = 6
 
 
@@ -95,7 +101,8 @@ def centre_votes(
     classes = jax.nn.softmax(votes.logits)
     centres = cloud.points + LENGTH * votes.values["centre"]
     scale = jnp.exp(votes.log_scale["centre"])
-    return centres, jnp.where(cloud.mask, (1 - classes[:, 0]) / (0.02 + scale), 0.0)
+    weight = (classes[:, 1] * _PANEL + classes[:, 2]) / (0.02 + scale)
+    return centres, jnp.where(cloud.mask, weight, 0.0)
 
 
 def _peaks(
@@ -125,20 +132,28 @@ def _part(
 ) -> tuple[Array, ...]:
     moving = member * (1 - jax.nn.softmax(votes.logits)[:, 0])
 
-    def settled(values: Array, scale: Array, start: Array | None = None) -> Array:
-        return settled_mean(values, scale, moving, config.rounds, start)
+    # Errors of neighbours' votes are alike, so that many vague ones of a panel must not outweigh the few
+    # of the handle itself.
+    held = moving * (config.panel + jax.nn.softmax(votes.logits)[:, 2])
+
+    def settled(
+        values: Array, scale: Array, start: Array | None = None, weight: Array = moving
+    ) -> Array:
+        return settled_mean(values, scale, weight, config.rounds, start)
 
     def scale_of(name: str) -> Array:
         return jnp.exp(votes.log_scale[name])
 
-    centre = settled(centres, LENGTH * scale_of("centre"), peak)
+    centre = settled(centres, LENGTH * scale_of("centre"), peak, held)
+    sure = moving / (scale_of("axis") + 0.05)
+    hinge = jax.nn.sigmoid(sure @ votes.hinge / (jnp.sum(sure) + 1e-9))
+    axis = _snapped(unit(settled(votes.values["axis"], scale_of("axis"))), config.snap)
     y = unit(settled(votes.values["y"], scale_of("y")))
+    # A drawer's handle looks the way it slides.
+    y = jnp.where((hinge < 0.5) & (y @ axis > np.cos(config.snap)), axis, y)
     x = settled(votes.values["x"], scale_of("x"))
     x = unit(x - (x @ y) * y)
     rotation = jnp.stack([x, y, jnp.cross(x, y)], axis=-1)
-    sure = moving / (scale_of("axis") + 0.05)
-    hinge = jax.nn.sigmoid(sure @ votes.hinge / (jnp.sum(sure) + 1e-9))
-    axis = unit(settled(votes.values["axis"], scale_of("axis")))
     feet = cloud.points + LENGTH * votes.values["line"]
     feet = feet - (feet @ axis)[:, None] * axis
     line = settled(feet, LENGTH * scale_of("line"))
@@ -153,6 +168,13 @@ def _part(
     spread = jnp.sqrt(certainty @ off**2 / (jnp.sum(certainty) + 1e-9) + 1e-12)
     handle = member @ jax.nn.softmax(votes.logits)[:, 2]
     return rotation, centre, hinge, axis, line, opening, spread, handle
+
+
+def _snapped(axis: Float[Array, "3"], within: float) -> Float[Array, "3"]:
+    """Along the body's nearest axis if that is as near as `within`: furniture's joints are."""
+    nearest = jnp.argmax(jnp.abs(axis))
+    along = jax.nn.one_hot(nearest, 3, dtype=axis.dtype) * jnp.sign(axis[nearest])
+    return jnp.where(axis @ along > np.cos(within), along, axis)
 
 
 def frame_turn(cloud: BodyCloud, votes: PointVotes, config: PartVotingConfig) -> Float[Array, "3"]:

@@ -135,7 +135,8 @@ def test_true_votes_give_the_true_parts(sample, seed):
         sample, ArticulatedLoss(rolled=0.0, strange=0.0), key=jax.random.key(seed)
     )
     votes = _true_votes(targets, known)
-    parts = jax.jit(find_parts, static_argnums=2)(cloud, votes, PartVotingConfig())
+    config = PartVotingConfig(snap=0.0)  # frames are some degrees off
+    parts = jax.jit(find_parts, static_argnums=2)(cloud, votes, config)
     seen = np.unique(np.asarray(sample.part[sample.part >= 0]))
     turn = from_vector(frame_turn(cloud, votes, PartVotingConfig()))
     for part in seen:
