@@ -16,10 +16,10 @@ from manipose_mj.ppf_jax.view_settings import view_setting
 
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
 # Published means: cm, deg.
-PUBLISHED = {"cup": (0.07, 0.58), "razor": (0.10, 1.32)}
+PUBLISHED = {"cup": (0.07, 0.58), "hammer": (0.15, 1.1)}
 
 
-@pytest.mark.parametrize("name", ["bowl", "box", "cup", "hammer", "razor"])
+@pytest.mark.parametrize("name", ["bowl", "box", "cup", "hammer", "mug", "razor"])
 def test_they_load_and_are_small(name):
     assert PoseEstimator.load(name).trained.categories == (name,)
     assert (FOLDER / f"{name}.npz").stat().st_size < 2e6
@@ -27,13 +27,13 @@ def test_they_load_and_are_small(name):
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_they_reproduce_their_published_figures(name):
-    clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=4, jobs=1)
+    clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=16, jobs=1)
     found = answers(PoseEstimator.load(name), clouds)
     figures = summary(pose_errors(found.poses, clouds))
     cm, deg = PUBLISHED[name]
-    assert len(clouds) == 40
-    # A quarter of the views of the table: their mean scatters.
-    assert figures["origin_cm_mean"] == pytest.approx(cm, rel=0.3)
-    assert figures["deg_mean"] == pytest.approx(deg, rel=0.3)
+    assert len(clouds) == 160
+    # The last digit of the table, and what the rounding of another machine may turn.
+    assert figures["origin_cm_mean"] == pytest.approx(cm, abs=0.01)
+    assert figures["deg_mean"] == pytest.approx(deg, abs=0.1)
     assert figures["flipped"] == 0.0
     assert np.isfinite(found.confidence).all()
