@@ -18,7 +18,8 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE, Split
+from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
+from asset_pipeline.catalogue import CATALOGUE, Split
 from asset_pipeline.source_hash import source_hash
 from asset_pipeline.staging import staging
 from manipose_mj.errors import InputError
@@ -142,9 +143,7 @@ def random_cloud(scene: FurnitureScene, rng: np.random.Generator) -> FurnitureCl
 
 def scene_folder(setting: str) -> Path:
     """Where scenes are kept: under `$MANIPOSE_CACHE`, else `~/.cache/manipose-mj`."""
-    root = os.environ.get(CACHE_VARIABLE)
-    home = Path(root) if root else Path.home() / ".cache" / "manipose-mj"
-    return home / "clouds" / f"furniture-{setting}-{_code_hash(setting)}"
+    return cache_root() / "clouds" / f"furniture-{setting}-{_code_hash(setting)}"
 
 
 @cache

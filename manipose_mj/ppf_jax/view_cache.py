@@ -18,7 +18,8 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE, Split, instances
+from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
+from asset_pipeline.catalogue import CATALOGUE, Split, instances
 from asset_pipeline.source_hash import source_hash
 from asset_pipeline.stable_poses import stable_poses
 from asset_pipeline.staging import staging
@@ -152,9 +153,7 @@ def _source_label(category: str, name: str) -> SourceLabel:
 
 def cache_folder(category: str, setting: ViewSetting) -> Path:
     """Where the views of a category are kept: under `$MANIPOSE_CACHE`, else `~/.cache/manipose-mj`."""
-    root = os.environ.get(CACHE_VARIABLE)
-    home = Path(root) if root else Path.home() / ".cache" / "manipose-mj"
-    return home / "clouds" / f"{category}-{setting.name}-{_code_hash(category, setting)}"
+    return cache_root() / "clouds" / f"{category}-{setting.name}-{_code_hash(category, setting)}"
 
 
 @cache

@@ -8,7 +8,8 @@ import pytest
 import trimesh
 from scipy.ndimage import binary_erosion
 
-from asset_pipeline.catalogue import CACHE_VARIABLE, CATALOGUE
+from asset_pipeline.cache_root import CACHE_VARIABLE
+from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import PoseLabel
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.depth_normals import depth_normals
