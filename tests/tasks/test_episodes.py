@@ -9,6 +9,7 @@ from episode_driver import HOLD, reset, wander
 from manipose_mj import suite
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda import HOME, MAX_OPENING, VELOCITY_LIMITS
+from manipose_mj.mjcf.panda_model import SERVO_LAG
 from manipose_mj.tasks.observations import SensorConfig
 
 SENSORS = SensorConfig(height=60, width=80, cloud_size=4096)
@@ -90,5 +91,12 @@ def test_actions_beyond_the_limits_are_clipped(blind):
     np.testing.assert_allclose(servos.ctrl - before, most, rtol=1e-9)  # as fast as a Panda may move
     for _ in range(80):
         blind.step(np.full(8, 100.0))
-    limits = blind.action_spec().maximum
-    np.testing.assert_allclose(blind.physics.bind(task.robot.actuators).ctrl, limits[:7])
+    limits = blind.action_spec().maximum[:7]
+    targets = np.array(blind.physics.bind(task.robot.actuators).ctrl)
+    joints, _ = task.robot.configuration(blind.physics)
+    assert (targets <= limits + 1e-9).all()
+    # At the limit, or, where something is in the arm's way, no further ahead than drives it at its speed
+    # limit; what a joint moves back in the last step comes on top.
+    ahead = targets - joints
+    led = np.abs(ahead) < SERVO_LAG * VELOCITY_LIMITS + 0.01
+    assert (np.isclose(targets, limits) | led).all()
