@@ -42,13 +42,15 @@ __all__ = [
     "PandaObservables",
 ]
 
-_LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
+_LOWEST, _HIGHEST = POSITION_LIMITS.T.tolist()
+_FASTEST = VELOCITY_LIMITS.tolist()
 # A servo whose set-point stays this far ahead drives its joint, or the TCP, at the limit of its speed.
-_JOINT_LEAD = SERVO_LAG * VELOCITY_LIMITS  # [rad]
+_JOINT_LEAD = (SERVO_LAG * VELOCITY_LIMITS).tolist()  # [rad]
 _TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
-# The TCP is never further than this from a joint's axis [m].
+# The TCP is never further than this from a joint's axis [m]; leads of a smaller norm cannot be too long for it.
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
 _REACH = np.cumsum(_LINKS[::-1])[::-1]
+_SAFE_LEAD = _TCP_LEAD / float(np.linalg.norm(_REACH))  # [rad]
 Visuals = Literal["auto", "primitive", "menagerie"]
 
 
@@ -187,19 +189,27 @@ class Panda(composer.Entity):
         it would be flung after them, at several times its limits, as soon as it could move again.
         """
         ids, data = self._model_ids(physics), physics.data.ptr
-        control, angles = data.ctrl, data.qpos[ids.angles]
-        most = VELOCITY_LIMITS * physics.model.ptr.opt.timestep
-        now = control[ids.arm]
-        # Within a step's way of where it is, then within the limits; without np.clip's overhead.
-        joints = np.minimum(np.maximum(target[:7], now - most), now + most)
-        joints = np.minimum(np.maximum(joints, angles - _JOINT_LEAD), angles + _JOINT_LEAD)
-        lead = joints - angles
-        if np.abs(lead) @ _REACH > _TCP_LEAD:
-            way = _tcp_way(data, ids, lead)
-            if way > _TCP_LEAD:
-                joints = angles + lead * (_TCP_LEAD / way)
-        control[ids.arm] = np.minimum(np.maximum(joints, _LOWEST), _HIGHEST)
-        control[ids.gripper] = min(max(target[7], 0.0), MAX_OPENING)
+        control, step = data.ctrl, ids.model.opt.timestep
+        goals, angles = target.tolist(), data.qpos[ids.angles].tolist()
+        # Plain numbers: for seven, NumPy takes several times as long. Within a step's way of where the
+        # set-point is, then within the lead of where the joint is.
+        leads = [
+            min(max(min(max(goal, now - step * fast), now + step * fast) - angle, -lead), lead)
+            for goal, now, angle, fast, lead in zip(
+                goals, control[ids.arm].tolist(), angles, _FASTEST, _JOINT_LEAD, strict=False
+            )
+        ]
+        if math.hypot(*leads) > _SAFE_LEAD:
+            mujoco.mj_jacSite(ids.model, data, ids.jacobian, None, ids.tcp)
+            way = ids.jacobian[:, ids.dofs] @ leads
+            length = math.sqrt(way @ way)
+            if length > _TCP_LEAD:
+                leads = [lead * (_TCP_LEAD / length) for lead in leads]
+        control[ids.arm] = [
+            min(max(angle + lead, lowest), highest)
+            for angle, lead, lowest, highest in zip(angles, leads, _LOWEST, _HIGHEST, strict=True)
+        ]
+        control[ids.gripper] = min(max(goals[7], 0.0), MAX_OPENING)
 
     def _model_ids(self, physics: mjcf.Physics) -> _Ids:
         """Where the robot is in a compiled model, looked up once for each."""
@@ -208,11 +218,12 @@ class Panda(composer.Entity):
             joints = np.array(physics.bind(self._joints).element_id)
             self._ids = _Ids(
                 model=model,
-                arm=np.array(physics.bind(self._actuators).element_id),
+                arm=_run(physics.bind(self._actuators).element_id),
                 gripper=int(physics.bind(self._gripper_actuator).element_id),
-                joints=slice(int(joints[0]), int(joints[-1]) + 1),
-                angles=np.array(model.jnt_qposadr[joints]),
+                angles=_run(model.jnt_qposadr[joints]),
+                dofs=_run(model.jnt_dofadr[joints]),
                 tcp=int(physics.bind(self.tcp_site).element_id),
+                jacobian=np.zeros((3, model.nv)),
             )
         return self._ids
 
@@ -232,21 +243,26 @@ class Panda(composer.Entity):
 
 @dataclass(frozen=True)
 class _Ids:
-    """Attributes: model; in it: arm, gripper, actuators; joints; angles, where in qpos; tcp, the site."""
+    """Where the robot is in a model.
+
+    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; jacobian, room
+    for its Jacobian.
+    """
 
     model: mujoco.MjModel
-    arm: Int[np.ndarray, "7"]
+    arm: slice
     gripper: int
-    joints: slice
-    angles: Int[np.ndarray, "7"]
+    angles: slice
+    dofs: slice
     tcp: int
+    jacobian: Float[np.ndarray, "3 nv"]
 
 
-def _tcp_way(data: mujoco.MjData, ids: _Ids, turns: Float[np.ndarray, "7"]) -> float:
-    """How far the TCP goes for small turns of the joints [m]."""
-    x, y, z = (data.site_xpos[ids.tcp] - data.xanchor[ids.joints]).T
-    u, v, w = (data.xaxis[ids.joints] * turns[:, None]).T
-    return math.hypot(v @ z - w @ y, w @ x - u @ z, u @ y - v @ x)
+def _run(indices: Int[np.ndarray, "n"]) -> slice:
+    """Neighbours as a slice, which is quicker to index with."""
+    first = int(indices[0])
+    assert list(indices) == list(range(first, first + len(indices)))
+    return slice(first, first + len(indices))
 
 
 class PandaObservables(composer.Observables):
