@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from manipose_mj.cli.pose_train import CURVE_PICTURE, WEIGHTS_FILE
+from manipose_mj.cli.pose_train import CURVE_PICTURE, WEIGHTS_FILE, require_positive
 from manipose_mj.cli.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
@@ -43,11 +43,7 @@ def train_articulated(
       jobs: Processes that render.
     """
     one_thread_per_process()
-    for option, value in (("--scenes", scenes), ("--batch", batch), ("--steps", steps)):
-        if value < 1:
-            raise InputError(f"{option} is {value}; expected at least 1")
-    if minutes is not None and not minutes > 0:
-        raise InputError(f"--minutes is {minutes:g}; expected more than 0")
+    require_positive(minutes, scenes=scenes, batch=batch, steps=steps)
     if further < 0:
         raise InputError(f"--further is {further}; expected 0 or more")
     from manipose_mj.cli import output

@@ -58,11 +58,7 @@ def train_pose(
       jobs: Processes that render.
     """
     one_thread_per_process()
-    for option, value in (("--views", views), ("--batch", batch), ("--steps", steps)):
-        if value < 1:
-            raise InputError(f"{option} is {value}; expected at least 1")
-    if minutes is not None and not minutes > 0:
-        raise InputError(f"--minutes is {minutes:g}; expected more than 0")
+    require_positive(minutes, views=views, batch=batch, steps=steps)
     from manipose_mj.cli import output
     from manipose_mj.cli.pose_clouds import PoseClouds
     from manipose_mj.ppf_jax.curve_picture import draw_curve
@@ -115,3 +111,16 @@ def folder_name(name: str, method: str, labels: str) -> str:
     parts += [method] if method != "ours" else []
     parts += [labels] if labels != "unified" else []
     return "-".join(parts)
+
+
+def require_positive(minutes: float | None, **counts: int) -> None:
+    """Refuse a training of no length.
+
+    Raises:
+      InputError: An option, named as it is on the command line, is less than 1, or `minutes` not positive.
+    """
+    for option, value in counts.items():
+        if value < 1:
+            raise InputError(f"--{option} is {value}; expected at least 1")
+    if minutes is not None and not minutes > 0:
+        raise InputError(f"--minutes is {minutes:g}; expected more than 0")

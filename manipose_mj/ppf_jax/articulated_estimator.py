@@ -17,8 +17,8 @@ from jaxtyping import Float, PRNGKeyArray
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated_clouds import CLOUD_POINTS
 from manipose_mj.ppf_jax.articulated_model import ArticulatedModel, estimate_furniture
+from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
-from manipose_mj.ppf_jax.estimator import AnyCloud
 from manipose_mj.ppf_jax.weights import load_weights
 
 WEIGHTS = "furniture.npz"
@@ -181,33 +181,9 @@ def _parts(row: Row, least: float) -> list[PartEstimate]:
 
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
     """At most `CLOUD_POINTS` points and their unit normals."""
-    oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
-    points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
-        raise InputError(
-            f"cloud of shape {points.shape} and type {points.dtype}; expected numbers, (points, 3)"
-        )
-    normals = np.asarray(cloud.normals) if oriented else None  # pyright: ignore[reportAttributeAccessIssue]
-    if normals is not None and normals.shape != points.shape:
-        raise InputError(f"normals of shape {normals.shape} with points of shape {points.shape}")
-    if len(points) < MIN_POINTS:
-        raise InputError(f"cloud of {len(points)} points; expected at least {MIN_POINTS}")
-    for what, values in (("points", points), ("normals", normals)):
-        if values is not None and not np.all(np.isfinite(values)):
-            bad = int(np.sum(~np.all(np.isfinite(values), axis=1)))
-            raise InputError(f"{bad} of {len(values)} {what} are not finite; leave them out")
-    middle = np.median(points, axis=0)
-    # Half of the points, so that no stray one decides.
-    span = 4 * float(np.median(np.linalg.norm(points - middle, axis=1)))
-    if span > _LONGEST:
-        hint = ": millimetres? divide by 1000" if span < 1000 * _LONGEST else ""
-        raise InputError(f"cloud about {span:.3g} m across; expected metres{hint}")
-    if span < _SHORTEST:
-        what = "all points are equal" if np.ptp(points, axis=0).max() == 0 else "too small"
-        raise InputError(
-            f"cloud about {1000 * span:.2g} mm across: {what}; expected the surface of furniture in metres"
-        )
-    points = points.astype(np.float32)
+    points, normals = checked_cloud(
+        cloud, fewest=MIN_POINTS, shortest=_SHORTEST, longest=_LONGEST, what="furniture"
+    )
     seed = np.asarray(jax.random.key_data(key)).ravel()
     rows = np.random.default_rng(seed).permutation(len(points))[:CLOUD_POINTS]
     points, normals = points[rows], None if normals is None else normals[rows]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Protocol, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, PoseModel, estimate_batch
@@ -26,19 +26,6 @@ from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
 _LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
-
-
-class OrientedCloud(Protocol):
-    """What an estimator looks at: points [m] in the camera frame and unit normals."""
-
-    @property
-    def points(self) -> Float[np.ndarray, "n 3"]: ...
-
-    @property
-    def normals(self) -> Float[np.ndarray, "n 3"]: ...
-
-
-AnyCloud: TypeAlias = OrientedCloud | Float[np.ndarray, "n 3"]
 
 
 @dataclass(frozen=True)
@@ -191,33 +178,9 @@ def _looks_at(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray) ->
 
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:
     """At most `MAX_POINTS` points and their unit normals, towards the camera; None without any."""
-    oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
-    points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
-        raise InputError(
-            f"cloud of shape {points.shape} and type {points.dtype}; expected numbers, (points, 3)"
-        )
-    normals = np.asarray(cloud.normals) if oriented else None  # pyright: ignore[reportAttributeAccessIssue]
-    if normals is not None and normals.shape != points.shape:
-        raise InputError(f"normals of shape {normals.shape} with points of shape {points.shape}")
-    if len(points) < MIN_POINTS:
-        raise InputError(f"cloud of {len(points)} points; expected at least {MIN_POINTS}")
-    for what, values in (("points", points), ("normals", normals)):
-        if values is not None and not np.all(np.isfinite(values)):
-            bad = int(np.sum(~np.all(np.isfinite(values), axis=1)))
-            raise InputError(f"{bad} of {len(values)} {what} are not finite; leave them out")
-    middle = np.median(points, axis=0)
-    # Half of the points, so that no stray one decides.
-    span = 4 * float(np.median(np.linalg.norm(points - middle, axis=1)))
-    if span > _LONGEST:
-        hint = ": millimetres? divide by 1000" if span < 1000 * _LONGEST else ""
-        raise InputError(f"cloud about {span:.3g} m across; expected metres{hint}")
-    if span < _SHORTEST:
-        what = "all points are equal" if np.ptp(points, axis=0).max() == 0 else "too small"
-        raise InputError(
-            f"cloud about {1000 * span:.2g} mm across: {what}; expected the surface of an object in metres"
-        )
-    points = points.astype(np.float32)
+    points, normals = checked_cloud(
+        cloud, fewest=MIN_POINTS, shortest=_SHORTEST, longest=_LONGEST, what="an object"
+    )
     if len(points) > MAX_POINTS:
         seed = np.asarray(jax.random.key_data(key)).ravel()
         rows = np.random.default_rng(seed).permutation(len(points))[:MAX_POINTS]
