@@ -25,6 +25,22 @@ def test_they_load_and_are_small(name):
     assert (FOLDER / f"{name}.npz").stat().st_size < 2e6
 
 
+def test_a_category_without_weights_gets_its_type_s():
+    for name, object_type in (("chips_can", "axial"), ("pencil", "functional")):
+        assert PoseEstimator.load(name).trained is PoseEstimator.load(object_type).trained
+        assert name in PoseEstimator.load(name).trained.categories
+        assert (FOLDER / f"{object_type}.npz").stat().st_size < 2e6
+
+
+def test_those_of_a_type_reproduce_a_published_figure():
+    clouds = catalogue_clouds("cup", "test", view_setting("anywhere"), views=4, jobs=1)
+    found = answers(PoseEstimator.load("axial"), clouds)
+    figures = summary(pose_errors(found.poses, clouds))
+    assert figures["deg_median"] == pytest.approx(1.00, abs=0.1)
+    assert figures["origin_cm_median"] == pytest.approx(0.10, abs=0.02)
+    assert figures["flipped"] == 0.0
+
+
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_they_reproduce_their_published_figures(name):
     clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=16, jobs=1)
