@@ -25,7 +25,7 @@ from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.visible_shapes import surface, visible_shapes
 from manipose_mj.poses import SymmetryGroup, compose, invert, transform
 
-SHAPES = 8  # training objects of a category that are known: two of each of its four styles
+SHAPES = 8  # training objects of a category that are known: its styles take turns among them
 _SURFACE_POINTS = 1500
 _ALIKE = 0.04  # relative difference of two lengths from which on a turn no longer exchanges them
 _FAR = (
@@ -108,9 +108,8 @@ def known_shapes(category: str) -> tuple[KnownShape, ...]:
     Raises:
       InputError: There is no such category.
     """
-    row = catalogue.CATALOGUE.get(category)
-    count = len(catalogue.instances(category)) if row is None else row.instances
-    assert row is not None
+    count = len(catalogue.instances(category))  # refuses what is no category
+    row = catalogue.CATALOGUE[category]
     training = [index for index in range(count) if row.split(index) == "train"]
     return tuple(shape_of(catalogue.load(category, index)) for index in training[:SHAPES])
 
