@@ -205,6 +205,19 @@ def test_the_arm_keeps_to_its_speed_limits_even_once_it_breaks_free():
             assert (np.abs(joints.qvel) < 1.15 * VELOCITY_LIMITS).all()
 
 
+def test_motions_within_the_limits_are_passed_on_bit_for_bit():
+    rng = np.random.default_rng(0)
+    panda, physics = make_scene()
+    panda.set_configuration(physics, HOME, MAX_OPENING)
+    panda.apply_targets(physics, HOME, MAX_OPENING)
+    target = np.append(HOME, MAX_OPENING)
+    for _ in range(100):
+        target[:7] += rng.uniform(-0.2, 0.2, 7) * VELOCITY_LIMITS * physics.timestep()
+        panda.follow_targets(physics, target)
+        np.testing.assert_array_equal(physics.bind(panda.actuators).ctrl, target[:7])
+        physics.step()
+
+
 def pad_contacts(panda, physics):
     """The normal force on each pad [N] and the deepest penetration [m] of the object."""
     pads = list(physics.bind(panda.pad_geoms).element_id)
