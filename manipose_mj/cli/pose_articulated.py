@@ -40,17 +40,20 @@ def train_articulated(
       minutes: Ends the training, cooled down, if the steps do not.
       seed: Of the first weights and of all that training draws.
       start_from: Weights of an earlier training to start from, instead of random ones.
-      jobs: Processes that render.
+      jobs: Processes that render, and beside a GPU make the batches.
     """
     one_thread_per_process()
     require_positive(minutes, scenes=scenes, batch=batch, steps=steps)
     if further < 0:
         raise InputError(f"--further is {further}; expected 0 or more")
+    import jax
+
     from manipose_mj.cli import output
     from manipose_mj.ppf_jax.articulated_cache import (
         furniture_names,
         furniture_scenes,
         furniture_stream,
+        parallel_furniture_stream,
     )
     from manipose_mj.ppf_jax.articulated_evaluation import calibrated, scene_clouds
     from manipose_mj.ppf_jax.articulated_losses import ArticulatedLoss
@@ -60,13 +63,19 @@ def train_articulated(
     from manipose_mj.ppf_jax.training import CURVE_FILE, Row, TrainingConfig, train
     from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
+    objects = furniture_names("train", further)
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(
-            furniture_names("train", further),
+            objects,
             "training",
             scenes=scenes,
             jobs=jobs,
             progress=progress.update,
+        )
+    feed = furniture_stream(known, batch, seed)
+    if jobs > 1 and jax.default_backend() != "cpu":
+        feed = parallel_furniture_stream(
+            objects, "training", scenes=scenes, batch=batch, seed=seed, jobs=jobs
         )
     with output.Progress("steps") as progress:
 
@@ -74,7 +83,7 @@ def train_articulated(
             progress.update(int(row["step"]) + 1, steps, f"loss {row['loss']:.3f}")
 
         model = train(
-            furniture_stream(known, batch, seed),  # pyright: ignore[reportArgumentType]
+            feed,  # pyright: ignore[reportArgumentType]
             ArticulatedConfig(),
             TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss()),  # pyright: ignore[reportArgumentType]
             out,

@@ -10,9 +10,12 @@ import itertools
 import os
 import pickle
 import zlib
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from functools import cache
 from importlib.metadata import version
+from multiprocessing import get_context
 from pathlib import Path
 
 import joblib
@@ -124,12 +127,62 @@ def furniture_stream(
 
     def batches(start: int) -> Iterator[FurnitureBatch]:
         for step in itertools.count(start):
-            rng = np.random.default_rng([seed, 1, step])
-            chosen = rng.integers(len(scenes), size=batch)
-            clouds = [random_cloud(scenes[i], rng) for i in chosen]
-            yield batch_furniture(clouds, rng=rng)
+            yield _batch(scenes, batch, seed, step)
 
     return batches
+
+
+def parallel_furniture_stream(
+    objects: Sequence[tuple[str, int]],
+    setting: str,
+    *,
+    scenes: int,
+    batch: int,
+    seed: int,
+    jobs: int,
+) -> Callable[[int], Iterator[FurnitureBatch]]:
+    """The batches of `furniture_stream`, made ahead by other processes: a GPU takes them faster than one can.
+
+    Args:
+      objects: Category and index of each, whose scenes are in the cache.
+      setting: A name in `FURNITURE_SETTINGS`.
+      scenes: Of each object; every process keeps them all in memory.
+      batch: Clouds in a batch.
+      seed: Of the clouds and their points.
+      jobs: Processes.
+    """
+
+    def batches(start: int) -> Iterator[FurnitureBatch]:
+        workers = ProcessPoolExecutor(
+            jobs, get_context("spawn"), _keep_scenes, (tuple(objects), setting, scenes)
+        )
+        try:
+            ahead: deque[Future[FurnitureBatch]] = deque()
+            for step in itertools.count(start):
+                ahead.append(workers.submit(_batch_of_kept, batch, seed, step))
+                if len(ahead) > 3 * jobs:
+                    yield ahead.popleft().result()
+        finally:
+            workers.shutdown(wait=False, cancel_futures=True)
+
+    return batches
+
+
+_kept: list[FurnitureScene] = []  # of a process that makes batches
+
+
+def _keep_scenes(objects: Sequence[tuple[str, int]], setting: str, scenes: int) -> None:
+    _kept[:] = [scene for each in objects for scene in _read(*each, setting, scenes)]
+
+
+def _batch_of_kept(batch: int, seed: int, step: int) -> FurnitureBatch:
+    return _batch(_kept, batch, seed, step)
+
+
+def _batch(scenes: Sequence[FurnitureScene], batch: int, seed: int, step: int) -> FurnitureBatch:
+    rng = np.random.default_rng([seed, 1, step])
+    chosen = rng.integers(len(scenes), size=batch)
+    return batch_furniture([random_cloud(scenes[i], rng) for i in chosen], rng=rng)
 
 
 def random_cloud(scene: FurnitureScene, rng: np.random.Generator) -> FurnitureCloud:

@@ -12,7 +12,12 @@ import pytest
 from manipose_mj.errors import InputError
 from manipose_mj.poses import rotation_about
 from manipose_mj.ppf_jax import articulated_model as module
-from manipose_mj.ppf_jax.articulated_cache import random_scene
+from manipose_mj.ppf_jax.articulated_cache import (
+    furniture_scenes,
+    furniture_stream,
+    parallel_furniture_stream,
+    random_scene,
+)
 from manipose_mj.ppf_jax.articulated_clouds import (
     FurnitureScene,
     batch_furniture,
@@ -126,6 +131,16 @@ def _true_votes(targets, known) -> PointVotes:
     hinge = jnp.where(known["hinge"], 10.0, -10.0)
     scales = dict.fromkeys(VOTES, jnp.full(count, -3.0))
     return PointVotes(logits, hinge, values, scales, jnp.zeros(()))
+
+
+def test_batches_are_the_same_whoever_makes_them(tmp_path, monkeypatch):
+    monkeypatch.setenv("MANIPOSE_CACHE", str(tmp_path))
+    objects = [("microwave", 0)]
+    scenes = furniture_scenes(objects, "training", scenes=2)
+    alone = furniture_stream(scenes, 2, seed=3)(5)
+    helped = parallel_furniture_stream(objects, "training", scenes=2, batch=2, seed=3, jobs=2)(5)
+    for _ in range(9):  # more than are made ahead
+        jax.tree.map(np.testing.assert_array_equal, next(alone), next(helped))
 
 
 @pytest.mark.parametrize("seed", range(6))
