@@ -3,7 +3,7 @@
     python benchmarks/grasp_audit.py FOLDER_OF_ASSETS [--again] [--markdown FILE] [--record FILE]
 
 Every asset carries the outcome of its trials: `asset_pipeline.grasp_trial` closed a floating hand on up to
-60 of its collision-free grasps, lifted and shook it, by friction alone, until 24 had held. `--again`
+60 of its collision-free grasps, lifted and shook it, by friction alone, until 20 had held. `--again`
 repeats the trials here with a finer time step, a longer lift and a wider shake.
 """
 
