@@ -42,15 +42,13 @@ __all__ = [
     "PandaObservables",
 ]
 
-_LOWEST, _HIGHEST = POSITION_LIMITS.T.tolist()
-_FASTEST = VELOCITY_LIMITS.tolist()
+_LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
 # A servo whose set-point stays this far ahead drives its joint, or the TCP, at the limit of its speed.
-_JOINT_LEAD = (SERVO_LAG * VELOCITY_LIMITS).tolist()  # [rad]
+_JOINT_LEAD = SERVO_LAG * VELOCITY_LIMITS  # [rad]
 _TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
-# The TCP is never further than this from a joint's axis [m]; leads of a smaller norm cannot be too long for it.
+# The TCP is never further than this from each joint's axis [m].
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
 _REACH = np.cumsum(_LINKS[::-1])[::-1]
-_SAFE_LEAD = _TCP_LEAD / float(np.linalg.norm(_REACH))  # [rad]
 Visuals = Literal["auto", "primitive", "menagerie"]
 
 
@@ -189,32 +187,19 @@ class Panda(composer.Entity):
         it would be flung after them, at several times its limits, as soon as it could move again.
         """
         ids, data = self._model_ids(physics), physics.data.ptr
-        control, step = data.ctrl, ids.model.opt.timestep
-        goals, angles = target.tolist(), data.qpos[ids.angles].tolist()
-        # Plain numbers: for seven, they are quicker than NumPy. Within a step's way of where the
-        # set-point is, then within the lead of where the joint is.
-        joints = [
-            min(
-                max(min(max(goal, now - step * fast), now + step * fast), angle - lead),
-                angle + lead,
-            )
-            for goal, now, angle, fast, lead in zip(
-                goals, control[ids.arm].tolist(), angles, _FASTEST, _JOINT_LEAD, strict=False
-            )
-        ]
-        leads = [joint - angle for joint, angle in zip(joints, angles, strict=True)]
-        if math.hypot(*leads) > _SAFE_LEAD:
+        control, angles = data.ctrl[ids.arm], data.qpos[ids.angles]
+        # Within a step's way of where the set-point is, then within the lead of where the joint is.
+        joints = np.minimum(np.maximum(target[:7], control - ids.way), control + ids.way)
+        joints = np.minimum(np.maximum(joints, angles - _JOINT_LEAD), angles + _JOINT_LEAD)
+        leads = joints - angles
+        if np.abs(leads) @ _REACH > _TCP_LEAD:
             mujoco.mj_jacSite(ids.model, data, ids.jacobian, None, ids.tcp)
             way = ids.jacobian[:, ids.dofs] @ leads
             length = math.sqrt(way @ way)
             if length > _TCP_LEAD:
-                share = _TCP_LEAD / length
-                joints = [angle + share * lead for angle, lead in zip(angles, leads, strict=True)]
-        control[ids.arm] = [
-            min(max(joint, lowest), highest)
-            for joint, lowest, highest in zip(joints, _LOWEST, _HIGHEST, strict=True)
-        ]
-        control[ids.gripper] = min(max(goals[7], 0.0), MAX_OPENING)
+                joints = angles + (_TCP_LEAD / length) * leads
+        np.minimum(np.maximum(joints, _LOWEST), _HIGHEST, out=control)
+        data.ctrl[ids.gripper] = min(max(target[7], 0.0), MAX_OPENING)
 
     def _model_ids(self, physics: mjcf.Physics) -> _Ids:
         """Where the robot is in a compiled model, looked up once for each."""
@@ -228,6 +213,7 @@ class Panda(composer.Entity):
                 angles=_run(model.jnt_qposadr[joints]),
                 dofs=_run(model.jnt_dofadr[joints]),
                 tcp=int(physics.bind(self.tcp_site).element_id),
+                way=model.opt.timestep * VELOCITY_LIMITS,
                 jacobian=np.zeros((3, model.nv)),
             )
         return self._ids
@@ -250,8 +236,8 @@ class Panda(composer.Entity):
 class _Ids:
     """Where the robot is in a model.
 
-    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; jacobian, room
-    for its Jacobian.
+    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; way, that
+    joints may go in a step [rad]; jacobian, room for the site's Jacobian.
     """
 
     model: mujoco.MjModel
@@ -260,6 +246,7 @@ class _Ids:
     angles: slice
     dofs: slice
     tcp: int
+    way: Float[np.ndarray, "7"]
     jacobian: Float[np.ndarray, "3 nv"]
 
 
