@@ -122,7 +122,7 @@ def main() -> None:
     for row in (HEADER, *lines):
         print(f"{row[0]:<18}" + "".join(f"{cell:>14}" for cell in row[1:]))
     notes = [
-        f"Graspable: at least {MIN_HELD} grasps held; tried until 24 held or 60 were tried.",
+        f"Graspable: at least {MIN_HELD} grasps held; tried until so many held or 60 were tried.",
         f"{machine()}; {time.perf_counter() - start:.0f} s.",
     ]
     print("", *notes, sep="\n")

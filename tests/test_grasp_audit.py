@@ -53,5 +53,5 @@ def test_the_script_reads_assets_and_writes_a_table(audit, tmp_path, monkeypatch
     monkeypatch.setattr(sys, "argv", [*arguments, "--record", str(numbers)])
     audit.main()
     assert "box" in capsys.readouterr().out
-    assert "| box | 1 | 100% | 24 | 24 |" in table.read_text() and "mujoco" in table.read_text()
+    assert "| box | 1 | 100% | 20 | 20 |" in table.read_text() and "mujoco" in table.read_text()
     assert json.loads(numbers.read_text()) == {"held": {}}
