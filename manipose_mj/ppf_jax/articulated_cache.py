@@ -7,7 +7,6 @@ file and the code.
 from __future__ import annotations
 
 import itertools
-import os
 import pickle
 import zlib
 from collections import deque
@@ -21,10 +20,9 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
+from asset_pipeline.cache_root import cache_root
 from asset_pipeline.catalogue import CATALOGUE, Split
 from asset_pipeline.source_hash import source_hash
-from asset_pipeline.staging import staging
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated_clouds import (
     FurnitureBatch,
@@ -44,6 +42,7 @@ from manipose_mj.ppf_jax.articulated_views import (
     random_openings,
     render_furniture,
 )
+from manipose_mj.ppf_jax.cache_file import new_cache_file
 from manipose_mj.ppf_jax.view_cache import Report
 
 SCENES_PER_FILE = 4
@@ -225,24 +224,12 @@ def _fill(category: str, index: int, setting: str, scenes: int) -> str:
                 random_scene(subject, FURNITURE_SETTINGS[setting], first + i, rng)
                 for i in range(SCENES_PER_FILE)
             ]
-            _write(files[number], rendered)
+            with new_cache_file(files[number]) as path:
+                path.write_bytes(pickle.dumps(rendered))
     return CATALOGUE[category].instance(index)
 
 
-def _write(path: Path, scenes: Sequence[FurnitureScene]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with staging(path) as scratch:
-            (scratch / path.name).write_bytes(pickle.dumps(list(scenes)))
-            os.replace(scratch / path.name, path)
-    except OSError as error:
-        raise InputError(
-            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
-            f"set {CACHE_VARIABLE} to a folder with room that can be written"
-        ) from None
-
-
 def _read(category: str, index: int, setting: str, scenes: int) -> list[FurnitureScene]:
-    # Our own cache, written by `_write`.
+    # Our own cache, written by `_fill`.
     read = [pickle.loads(p.read_bytes()) for p in _files(category, index, setting, scenes)]
     return [scene for some in read for scene in some][:scenes]

@@ -7,7 +7,6 @@ the file and the code, so that any number of processes can write them in any ord
 from __future__ import annotations
 
 import itertools
-import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -18,13 +17,13 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
+from asset_pipeline.cache_root import cache_root
 from asset_pipeline.catalogue import CATALOGUE, Split, instances
 from asset_pipeline.source_hash import source_hash
 from asset_pipeline.stable_poses import stable_poses
-from asset_pipeline.staging import staging
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.cache_file import new_cache_file
 from manipose_mj.ppf_jax.clouds import (
     SAMPLE_POINTS,
     CloudBatch,
@@ -202,31 +201,18 @@ def _catalogue_occluders(name: str) -> list[Occluder]:
 
 
 def _write(path: Path, clouds: Sequence[LabelledCloud]) -> None:
-    """Write aside, then move in place.
-
-    Raises:
-      InputError: The cache cannot be written.
-    """
     group = clouds[0].symmetry
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with staging(path) as scratch:
-            np.savez(
-                scratch / path.name,
-                points=np.concatenate([cloud.points for cloud in clouds]),
-                normals=np.concatenate([cloud.normals for cloud in clouds]),
-                starts=np.cumsum([0, *(len(cloud) for cloud in clouds)]),
-                pose=np.stack([cloud.pose for cloud in clouds]),
-                extents=clouds[0].extents,
-                rotations=group.rotations,
-                axial=group.axial,
-            )
-            os.replace(scratch / path.name, path)
-    except OSError as error:
-        raise InputError(
-            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
-            f"set {CACHE_VARIABLE} to a folder with room that can be written"
-        ) from None
+    with new_cache_file(path) as scratch:
+        np.savez(
+            scratch,
+            points=np.concatenate([cloud.points for cloud in clouds]),
+            normals=np.concatenate([cloud.normals for cloud in clouds]),
+            starts=np.cumsum([0, *(len(cloud) for cloud in clouds)]),
+            pose=np.stack([cloud.pose for cloud in clouds]),
+            extents=clouds[0].extents,
+            rotations=group.rotations,
+            axial=group.axial,
+        )
 
 
 def _read(category: str, index: int, setting: ViewSetting, views: int) -> list[LabelledCloud]:
