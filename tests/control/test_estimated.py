@@ -22,6 +22,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.mjcf.objects import RigidObject
 from manipose_mj.poses import compose, invert, rotation_about
+from manipose_mj.ppf_jax import estimator
 from manipose_mj.ppf_jax.estimator import PoseEstimate
 
 TARGET_POSE = "single_object/target_pose"
@@ -162,7 +163,8 @@ def test_what_no_camera_sees_fails_in_perception(cup, truth):
     assert failure.value.stage == "perception"
 
 
-def test_a_category_without_weights_is_told_in_one_line():
+def test_a_category_without_weights_is_told_in_one_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(estimator.resources, "files", lambda _: tmp_path)
     with pytest.raises(InputError, match="no weights for remote") as error:
         episode.run_episode(
             TARGET_POSE, episode=0, seed=0, pose="estimated", object_name="remote_000"

@@ -15,8 +15,9 @@ from manipose_mj.ppf_jax.view_cache import catalogue_clouds
 from manipose_mj.ppf_jax.view_settings import view_setting
 
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
-# Published means: cm, deg.
-PUBLISHED = {"cup": (0.07, 0.58), "hammer": (0.15, 1.1)}
+# Published: cm, deg. Means; medians where a few views are mistaken for another side, which weighs on a mean.
+MEANS = {"bowl": (0.10, 0.7), "cup": (0.07, 0.58), "hammer": (0.15, 1.1), "razor": (0.10, 1.3)}
+MEDIANS = {"box": (0.16, 0.71), "mug": (0.13, 1.6)}
 
 
 @pytest.mark.parametrize("name", ["bowl", "box", "cup", "hammer", "mug", "razor"])
@@ -26,30 +27,39 @@ def test_they_load_and_are_small(name):
 
 
 def test_a_category_without_weights_gets_its_type_s():
-    for name, object_type in (("chips_can", "axial"), ("pencil", "functional")):
+    for name, object_type in (("chips_can", "axial"), ("teapot", "mirror"), ("pencil", "functional")):
         assert PoseEstimator.load(name).trained is PoseEstimator.load(object_type).trained
         assert name in PoseEstimator.load(name).trained.categories
         assert (FOLDER / f"{object_type}.npz").stat().st_size < 2e6
 
 
-def test_those_of_a_type_reproduce_a_published_figure():
-    clouds = catalogue_clouds("cup", "test", view_setting("anywhere"), views=4, jobs=1)
-    found = answers(PoseEstimator.load("axial"), clouds)
+@pytest.mark.parametrize(
+    ("name", "category", "cm", "deg"),
+    [
+        ("axial", "cup", 0.10, 1.00),
+        ("mirror", "steel_tape", 0.20, 3.12),
+        ("functional", "squeegee", 0.52, 1.48),
+    ],
+)
+def test_those_of_a_type_reproduce_a_published_figure(name, category, cm, deg):
+    clouds = catalogue_clouds(category, "test", view_setting("anywhere"), views=4, jobs=1)
+    found = answers(PoseEstimator.load(name), clouds)
     figures = summary(pose_errors(found.poses, clouds))
-    assert figures["deg_median"] == pytest.approx(1.00, abs=0.1)
-    assert figures["origin_cm_median"] == pytest.approx(0.10, abs=0.02)
+    assert figures["deg_median"] == pytest.approx(deg, abs=0.1)
+    assert figures["origin_cm_median"] == pytest.approx(cm, abs=0.02)
     assert figures["flipped"] == 0.0
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize("name", [*MEANS, *MEDIANS])
 def test_they_reproduce_their_published_figures(name):
     clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=16, jobs=1)
     found = answers(PoseEstimator.load(name), clouds)
     figures = summary(pose_errors(found.poses, clouds))
-    cm, deg = PUBLISHED[name]
+    cm, deg = (MEANS | MEDIANS)[name]
+    kind = "mean" if name in MEANS else "median"
     assert len(clouds) == 160
     # The last digit of the table, and what the rounding of another machine may turn.
-    assert figures["origin_cm_mean"] == pytest.approx(cm, abs=0.01)
-    assert figures["deg_mean"] == pytest.approx(deg, abs=0.1)
+    assert figures[f"origin_cm_{kind}"] == pytest.approx(cm, abs=0.01)
+    assert figures[f"deg_{kind}"] == pytest.approx(deg, abs=0.1)
     assert figures["flipped"] == 0.0
     assert np.isfinite(found.confidence).all()
