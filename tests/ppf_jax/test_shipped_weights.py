@@ -27,7 +27,11 @@ def test_they_load_and_are_small(name):
 
 
 def test_a_category_without_weights_gets_its_type_s():
-    for name, object_type in (("chips_can", "axial"), ("teapot", "mirror"), ("pencil", "functional")):
+    for name, object_type in (
+        ("chips_can", "axial"),
+        ("teapot", "mirror"),
+        ("pencil", "functional"),
+    ):
         assert PoseEstimator.load(name).trained is PoseEstimator.load(object_type).trained
         assert name in PoseEstimator.load(name).trained.categories
         assert (FOLDER / f"{object_type}.npz").stat().st_size < 2e6
