@@ -8,6 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipose_mj.ppf_jax.articulated_cache import furniture_names, furniture_scenes
+from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator
+from manipose_mj.ppf_jax.articulated_evaluation import evaluated, scene_clouds
+from manipose_mj.ppf_jax.articulated_metrics import summary as part_summary
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation import answers
 from manipose_mj.ppf_jax.metrics import pose_errors, summary
@@ -67,3 +71,16 @@ def test_they_reproduce_their_published_figures(name):
     assert figures[f"deg_{kind}"] == pytest.approx(deg, abs=0.1)
     assert figures["flipped"] == 0.0
     assert np.isfinite(found.confidence).all()
+
+
+def test_furniture_s_reproduce_published_shares():
+    """Of every fifth test object, half of the scenes that docs/pose.md counts, three views fused."""
+    scenes = furniture_scenes(furniture_names("test")[::5], "front", scenes=4)
+    estimator = ArticulatedEstimator.load()
+    assert (FOLDER / "furniture.npz").stat().st_size < 2e6
+    found = evaluated(estimator, scene_clouds(scenes, fused=3))
+    figures = part_summary(found.errors, found.strange, found.clouds)
+    assert figures["n"] == 32
+    # Of all 310 parts it is 72 %. One or two here are at the edge of a bar.
+    assert figures["all_right"] == pytest.approx(0.72, abs=0.07)
+    assert figures["joint_right"] == pytest.approx(0.94, abs=0.04)
