@@ -219,7 +219,7 @@ class ManipulationTask(composer.Task):
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         data = physics.data.ptr
-        if len(data.contact.dist):  # none are computed between things asleep
+        if data.ncon:  # none are computed between things asleep
             self.max_penetration = max(self.max_penetration, -float(data.contact.dist.min()))
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
