@@ -188,8 +188,9 @@ class Panda(composer.Entity):
         """
         ids, data = self._model_ids(physics), physics.data.ptr
         control, angles = data.ctrl[ids.arm], data.qpos[ids.angles]
+        step = ids.model.opt.timestep * VELOCITY_LIMITS
         # Within a step's way of where the set-point is, then within the lead of where the joint is.
-        joints = np.minimum(np.maximum(target[:7], control - ids.way), control + ids.way)
+        joints = np.minimum(np.maximum(target[:7], control - step), control + step)
         joints = np.minimum(np.maximum(joints, angles - _JOINT_LEAD), angles + _JOINT_LEAD)
         leads = joints - angles
         if np.abs(leads) @ _REACH > _TCP_LEAD:
@@ -213,7 +214,6 @@ class Panda(composer.Entity):
                 angles=_run(model.jnt_qposadr[joints]),
                 dofs=_run(model.jnt_dofadr[joints]),
                 tcp=int(physics.bind(self.tcp_site).element_id),
-                way=model.opt.timestep * VELOCITY_LIMITS,
                 jacobian=np.zeros((3, model.nv)),
             )
         return self._ids
@@ -236,8 +236,8 @@ class Panda(composer.Entity):
 class _Ids:
     """Where the robot is in a model.
 
-    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; way, that
-    joints may go in a step [rad]; jacobian, room for the site's Jacobian.
+    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; jacobian, room
+    for its Jacobian.
     """
 
     model: mujoco.MjModel
@@ -246,7 +246,6 @@ class _Ids:
     angles: slice
     dofs: slice
     tcp: int
-    way: Float[np.ndarray, "7"]
     jacobian: Float[np.ndarray, "3 nv"]
 
 
