@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,12 +55,25 @@ class PairFrames:
         axes = np.stack([first, closing, np.cross(closing, first)], axis=1)
         return PairFrames(self.center[level], axes, self.half[level], self.slant[level])
 
-    def local(self, pair: int, points: Float[np.ndarray, "3 n"]) -> Float[np.ndarray, "3 n"]:
-        """Points, given as rows of coordinates, along first, closing and other of one pair [m]."""
-        x, y, z = points - self.center[pair].astype(np.float32)[:, None]
-        axes = self.axes[pair].astype(np.float32)
-        # Written out: a BLAS may add in another order on another machine.
-        return np.stack([a[0] * x + a[1] * y + a[2] * z for a in axes])
+    def local(self, chosen: slice, points: Float[np.ndarray, "3 n"]) -> Float[np.ndarray, "3 p n"]:
+        """Points, given as rows of coordinates, along first, closing and other of these pairs [m]."""
+        centers = self.center[chosen].T.astype(np.float32)
+        offsets = [row - center[:, None] for row, center in zip(points, centers, strict=True)]
+        axes = self.axes[chosen].transpose(1, 2, 0).astype(np.float32)
+        return np.stack([_along(axis[..., None], offsets) for axis in axes])
+
+    def local_within(
+        self, pair: int, points: Float[np.ndarray, "3 n"], reach: tuple[float, float, float]
+    ) -> tuple[Float[np.ndarray, "3 k"], Int[np.ndarray, "k"]]:
+        """Those points that lie within `reach` along the three axes of one pair, and their indices."""
+        center = self.center[pair].astype(np.float32)
+        offsets = [row - middle for row, middle in zip(points, center, strict=True)]
+        local = [_along(axis, offsets) for axis in self.axes[pair].astype(np.float32)]
+        near = np.abs(local[0]) < reach[0]
+        for row, far in zip(local[1:], reach[1:], strict=True):
+            near &= np.abs(row) < far
+        index = np.flatnonzero(near)
+        return np.stack([row.take(index) for row in local]), index
 
     def rotations(self, pair: int, hands: Int[np.ndarray, "k"]) -> Float[np.ndarray, "k 3 3"]:
         """Of these hands in the object frame."""
@@ -67,6 +81,14 @@ class PairFrames:
         cos, sin = np.cos(_ANGLES[hands])[:, None], np.sin(_ANGLES[hands])[:, None]
         z, x = cos * first + sin * other, cos * other - sin * first
         return np.stack([x, np.broadcast_to(closing, z.shape), z], axis=2)
+
+
+def _along(axis: np.ndarray, offsets: Sequence[np.ndarray]) -> np.ndarray:
+    """Written out: a BLAS may add in another order on another machine."""
+    total = axis[0] * offsets[0]
+    total += axis[1] * offsets[1]
+    total += axis[2] * offsets[2]
+    return total
 
 
 def pair_frames(

@@ -88,15 +88,23 @@ def fit_pairs(
     longest = 2 * gripper.clearance + max(high[1] for _, high in gripper.finger)
     fits: list[_PairFit] = []
     pictures = []
+    offset = cloud.mass_properties.center_of_mass - frames.center
+    levers = np.linalg.norm(np.cross(offset, frames.axes[:, 1]), axis=1)
     for pair in range(len(frames)):
-        local = frames.local(pair, obstacles)
-        near = np.abs(local[1]) < frames.half[pair] + longest
-        near &= (np.abs(local[0]) < reach) & (np.abs(local[2]) < reach)
-        index = np.flatnonzero(near)
-        local = local[:, index]
+        local, index = frames.local_within(
+            pair, obstacles, (reach, frames.half[pair] + longest, reach)
+        )
         touch = index[: np.searchsorted(index, len(cloud.touch.points))]
+        surface = _between_pads(local[:, : len(touch)], frames.half[pair], gripper)
         fit = _fit(
-            cloud, frames, pair, local[:, : len(touch)], normals[:, touch], free[pair], gripper
+            cloud,
+            frames,
+            pair,
+            local[:, surface],
+            normals[:, touch[surface]],
+            np.flatnonzero(free[pair]),
+            levers[pair],
+            gripper,
         )
         if fit is not None:
             fits.append(fit)
@@ -122,23 +130,31 @@ class _PairFit:
     faces: Float[np.ndarray, "n 2"]
 
 
+def _between_pads(
+    local: Float[np.ndarray, "3 m"], half: float, gripper: ParallelJaw
+) -> Int[np.ndarray, "k"]:
+    """Which points of the surface pads may touch that close on a pair this far from its middle."""
+    near = np.abs(np.abs(local[1]) - half) < gripper.clearance
+    return np.flatnonzero(near & (np.hypot(local[0], local[2]) < pad_reach(gripper)))
+
+
 def _fit(
     cloud: ObjectCloud,
     frames: PairFrames,
     pair: int,
     surface: Float[np.ndarray, "3 m"],
     normals: Float[np.ndarray, "3 m"],
-    free: Bool[np.ndarray, "hands"],
+    hands: Int[np.ndarray, "k"],
+    lever: float,
     gripper: ParallelJaw,
 ) -> _PairFit | None:
-    """What the pads of the free hands find on `surface`, given in the pair's frame; None if nothing."""
+    """What the pads of these hands find on `surface`, given in the pair's frame; None if nothing.
+
+    The weight pulls `lever` [m] away from the closing line.
+    """
     closing = frames.axes[pair, 1]
-    near = np.abs(np.abs(surface[1]) - frames.half[pair]) < gripper.clearance
-    near = np.flatnonzero(near & (np.hypot(surface[0], surface[2]) < pad_reach(gripper)))
-    surface, normals = surface[:, near], normals[:, near]
     y = closing.astype(np.float32)
     outward = (y[0] * normals[0] + y[1] * normals[1] + y[2] * normals[2]) * np.sign(surface[1])
-    hands = np.flatnonzero(free)
     contact = pad_contact(surface, outward, cloud.touch.spacing, hands, gripper)
     good = (contact.cover > MIN_COVER) & (contact.width > MIN_WIDTH)
     good &= contact.width < gripper.max_opening - gripper.min_clearance
@@ -151,7 +167,6 @@ def _fit(
     poses[:, :3, 3] = frames.center[pair] + middle[:, None] * closing
     poses[:, :3, 3] -= DEPTH[hands, None] * poses[:, :3, 2]
     weight = cloud.mass_properties
-    lever = np.linalg.norm(np.cross(weight.center_of_mass - frames.center[pair], closing))
     # Friction of both pads about the closing line, against the weight's torque.
     capacity = 2 * FRICTION * gripper.grip_force * (contact.radius[good] + TORSION)
     load = weight.mass * JERK * lever / capacity

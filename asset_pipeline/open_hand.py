@@ -75,7 +75,7 @@ def hand_free(
     free = np.ones((len(frames), HANDS), bool)
     for start in range(0, len(frames), _BLOCK):
         count = min(_BLOCK, len(frames) - start)
-        local = np.stack([frames.local(start + p, points) for p in range(count)], axis=1)
+        local = frames.local(slice(start, start + count), points)
         cell, inside = masks.index(local[0], local[2])
         cell += np.arange(count, dtype=np.int32)[:, None] * masks.size**2
         away = np.abs(local[1]) - COARSE_MARGIN

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from asset_pipeline.assets import StablePose
 from asset_pipeline.labelling.label import PoseLabel
 from asset_pipeline.rest_scene import rest_scene
+from asset_pipeline.toppling import rest_rotation, resting_faces
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_to_vector, quaternion_to_rotation
 
@@ -41,8 +42,7 @@ def stable_poses(
 
     Poses that differ by a turn about the vertical, by a symmetry of the label or by the facets of
     one curved side are one pose; the most probable of them stands for all and gets their sum. Those
-    under 1 % are dropped. Deterministic. Probabilities as in Goldberg et al., "Part pose
-    statistics" (IEEE T-RA 1999), computed by trimesh.
+    under 1 % are dropped. Deterministic. Probabilities are those of `resting_faces`.
 
     Args:
       surface: What touches the plane, in the object frame [m].
@@ -59,14 +59,12 @@ def stable_poses(
         raise InputError(
             f"centre of mass {np.round(center, 4).tolist()} lies outside the object's convex hull"
         )
-    transforms, probabilities = trimesh.poses.compute_stable_poses(
-        hull, center_mass=center, sigma=0.0, n_samples=1, seed=0
-    )
-    order = np.lexsort((*transforms[:, 2, :3].T.round(3), -probabilities.round(6)))
-    merged = _merge(transforms[order], probabilities[order], label)
-    kept = [(t, p) for t, p in merged if p >= MIN_PROBABILITY] or merged[:1]
+    normals, probabilities = resting_faces(hull, center)
+    order = np.lexsort((*-normals.T.round(3), -probabilities.round(6)))
+    merged = _merge(-normals[order], probabilities[order], label)
+    kept = [(up, p) for up, p in merged if p >= MIN_PROBABILITY] or merged[:1]
     total = sum(p for _, p in kept)
-    poses = [_stable_pose(t[:3, :3], p / total, hull) for t, p in kept]
+    poses = [_stable_pose(rest_rotation(-up), p / total, hull) for up, p in kept]
     return tuple(sorted(poses, key=lambda p: -round(p.probability, 6)))
 
 
@@ -118,13 +116,12 @@ def _tilts(
 
 
 def _merge(
-    transforms: Float[np.ndarray, "n 4 4"],
+    ups: Float[np.ndarray, "n 3"],
     probabilities: Float[np.ndarray, "n"],
     label: PoseLabel | None,
 ) -> list[tuple[np.ndarray, float]]:
     first: list[int] = []  # of the poses that are alike, the most probable
     total: list[float] = []
-    ups = transforms[:, 2, :3]
     for index, probability in enumerate(probabilities):
         alike = np.flatnonzero(_tilts(ups[index], ups[first], label) < MERGE_ANGLE)
         if len(alike):
@@ -132,7 +129,7 @@ def _merge(
         else:
             first.append(index)
             total.append(float(probability))
-    return list(zip(transforms[first], total, strict=True))
+    return list(zip(ups[first], total, strict=True))
 
 
 def _stable_pose(
