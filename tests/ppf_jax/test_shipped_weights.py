@@ -44,9 +44,9 @@ def test_a_category_without_weights_gets_its_type_s():
 @pytest.mark.parametrize(
     ("name", "category", "cm", "deg"),
     [
-        ("axial", "cup", 0.10, 1.00),
-        ("mirror", "steel_tape", 0.20, 3.12),
-        ("functional", "squeegee", 0.52, 1.48),
+        ("axial", "cup", 0.08, 0.56),
+        ("mirror", "steel_tape", 0.20, 1.67),
+        ("functional", "squeegee", 0.21, 1.05),
     ],
 )
 def test_those_of_a_type_reproduce_a_published_figure(name, category, cm, deg):
