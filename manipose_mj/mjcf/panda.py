@@ -187,7 +187,7 @@ class Panda(composer.Entity):
         it would be flung after them, at several times its limits, as soon as it could move again.
         """
         ids, data = self._model_ids(physics), physics.data.ptr
-        control, angles = data.ctrl[ids.arm], data.qpos[ids.angles]
+        control, angles = ids.control, ids.joint_angles
         step = ids.model.opt.timestep * VELOCITY_LIMITS
         # Within a step's way of where the set-point is, then within the lead of where the joint is.
         joints = np.minimum(np.maximum(target[:7], control - step), control + step)
@@ -203,25 +203,45 @@ class Panda(composer.Entity):
         data.ctrl[ids.gripper] = min(max(target[7], 0.0), MAX_OPENING)
 
     def _model_ids(self, physics: mjcf.Physics) -> _Ids:
-        """Where the robot is in a compiled model, looked up once for each."""
-        if self._ids is None or self._ids.model is not physics.model.ptr:
+        """Where the robot is in a compiled model and its data, looked up once for each."""
+        data = physics.data.ptr
+        if self._ids is None or self._ids.data is not data:
             model = physics.model.ptr
             joints = np.array(physics.bind(self._joints).element_id)
+            arm = _run(physics.bind(self._actuators).element_id)
+            angles = _run(model.jnt_qposadr[joints])
             self._ids = _Ids(
                 model=model,
-                arm=_run(physics.bind(self._actuators).element_id),
+                data=data,
+                arm=arm,
                 gripper=int(physics.bind(self._gripper_actuator).element_id),
-                angles=_run(model.jnt_qposadr[joints]),
+                angles=angles,
                 dofs=_run(model.jnt_dofadr[joints]),
+                fingers=_run(np.array(physics.bind(self._finger_joints).qposadr)),
                 tcp=int(physics.bind(self.tcp_site).element_id),
+                control=data.ctrl[arm],
+                joint_angles=data.qpos[angles],
                 jacobian=np.zeros((3, model.nv)),
             )
         return self._ids
 
     def configuration(self, physics: mjcf.Physics) -> tuple[Float[np.ndarray, "7"], float]:
         """The joint angles [rad] and the opening [m] now."""
-        joints = np.array(physics.bind(self._joints).qpos)
-        return joints, float(np.sum(physics.bind(self._finger_joints).qpos))
+        ids, positions = self._model_ids(physics), physics.data.ptr.qpos
+        return positions[ids.angles].copy(), float(positions[ids.fingers].sum())
+
+    def tcp_vector(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
+        """The tool centre point's pose in the world frame: position [m], then quaternion wxyz."""
+        if physics.is_dirty:
+            physics.forward()
+        site, data = self._model_ids(physics).tcp, physics.data.ptr
+        vector = np.empty(7)
+        vector[:3] = data.site_xpos[site]
+        mujoco.mju_mat2Quat(vector[3:], data.site_xmat[site])
+        # The sign of `rotation_to_quaternion`, which takes ten times as long.
+        first = next(part for part in vector[3:].tolist() if abs(part) > 1e-12)
+        vector[3:] *= math.copysign(1.0, first)
+        return vector
 
     def tcp_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
         """The tool centre point's pose in the world frame."""
@@ -234,18 +254,22 @@ class Panda(composer.Entity):
 
 @dataclass(frozen=True)
 class _Ids:
-    """Where the robot is in a model.
+    """Where the robot is in a model and its data.
 
-    Attributes: model; arm, gripper, actuators; angles, in qpos; dofs, in qvel; tcp, the site; jacobian, room
-    for its Jacobian.
+    Attributes: model; data; arm, gripper, actuators; angles, fingers, in qpos; dofs, in qvel; tcp, the site;
+    control, joint_angles, views of the arm's in `data`; jacobian, room for the site's Jacobian.
     """
 
     model: mujoco.MjModel
+    data: mujoco.MjData
     arm: slice
     gripper: int
     angles: slice
     dofs: slice
+    fingers: slice
     tcp: int
+    control: Float[np.ndarray, "7"]
+    joint_angles: Float[np.ndarray, "7"]
     jacobian: Float[np.ndarray, "3 nv"]
 
 
@@ -284,14 +308,4 @@ class PandaObservables(composer.Observables):
     @composer.observable
     def tcp_pose(self) -> observable.Observable:
         """The TCP in the world frame: position [m], then quaternion wxyz."""
-        return observable.Generic(self._tcp_vector)
-
-    def _tcp_vector(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
-        site = physics.bind(self._entity.tcp_site)
-        vector = np.empty(7)
-        vector[:3] = site.xpos
-        mujoco.mju_mat2Quat(vector[3:], np.array(site.xmat))
-        # The sign of `rotation_to_quaternion`, which takes ten times as long.
-        first = vector[3:][np.abs(vector[3:]) > 1e-12][0]
-        vector[3:] *= np.sign(first)
-        return vector
+        return observable.Generic(self._entity.tcp_vector)

@@ -155,8 +155,11 @@ class SceneReader:
     def _touching(self, data: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Who is touched by the robot, by its left pad and by its right pad; masks over owners."""
         pairs = self._owners[data.contact.geom]  # pyright: ignore[reportAttributeAccessIssue]
-        first, second = pairs[:, 0], pairs[:, 1]
         masks = np.zeros((3, self._count), bool)
+        pairs = pairs[pairs.min(axis=1) <= _RIGHT_PAD] if len(pairs) else pairs
+        if not len(pairs):  # as most of the time
+            return masks[0], masks[1], masks[2]
+        first, second = pairs[:, 0], pairs[:, 1]
         for one, other in ((first, second), (second, first)):
             masks[0, other[one <= _RIGHT_PAD]] = True
             masks[1, other[one == _LEFT_PAD]] = True
