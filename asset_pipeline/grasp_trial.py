@@ -28,9 +28,8 @@ PAD_SOLREF, PAD_SOLIMP = (0.005, 1.0), (0.95, 0.99, 0.001, 0.5, 2.0)
 FINGER_DAMPING = 1400.0
 GRIPPER_STIFFNESS = 14000.0  # of the opening [N/m]: thin things are gripped less hard
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_TOLERANCE = (
-    1e-6  # of the contact solver: on nine objects slips were the same to 0.05 mm as with 1e-8
-)
+# Of the contact solver: on nine objects slips were the same to 0.05 mm as with 1e-8.
+_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)

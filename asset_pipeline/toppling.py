@@ -3,7 +3,8 @@
 The quasi-static model of Goldberg et al., "Part pose statistics" (IEEE T-RA 1999): a body in a random
 orientation meets the ground with the face behind which its centre of mass sees it, and rolls on over
 one edge after another until the centre of mass stands over the face it lies on. It gives the same as
-`trimesh.poses.compute_stable_poses`, for all faces at once.
+`trimesh.poses.compute_stable_poses`, for all faces at once; but where the centre of mass stands exactly
+behind a corner, rounding decides in both onto which face the body rolls.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ class SceneReader:
         """Who is touched by the robot, by its left pad and by its right pad; masks over owners."""
         pairs = self._owners[data.contact.geom]  # pyright: ignore[reportAttributeAccessIssue]
         masks = np.zeros((3, self._count), bool)
-        pairs = pairs[pairs.min(axis=1) <= _RIGHT_PAD] if len(pairs) else pairs
+        pairs = pairs[pairs.min(axis=1) <= _RIGHT_PAD]
         if not len(pairs):  # as most of the time
             return masks[0], masks[1], masks[2]
         first, second = pairs[:, 0], pairs[:, 1]
