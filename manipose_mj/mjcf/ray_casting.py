@@ -4,7 +4,8 @@
 (centre not rotated with the body) and a geom by the azimuth and elevation of its box's corners
 (edges can lie outside them), so near or visual-only geoms lose pixels that `mj_ray` hits. Here its
 culling is switched off and replaced by one that cannot lose a hit: rays are sorted into bundles,
-and a bundle is shown the geoms whose oriented boxes reach into its pyramid. That is also faster.
+and a bundle is shown the geoms whose oriented boxes reach into its pyramid. That is also faster: for
+every ray MuJoCo goes through all geoms, of which scenes have hundreds; here through those of a bundle.
 """
 
 from __future__ import annotations
@@ -67,6 +68,8 @@ class RayHits:
     def within(self, scale: float) -> RayHits:
         """These hits, those beyond `scale` counted as nothing."""
         beyond = self.scale > scale
+        if not beyond.any():
+            return self
         return RayHits(
             np.where(beyond, -1.0, self.scale),
             np.where(beyond, np.int32(-1), self.geom_id),
@@ -120,8 +123,8 @@ def cast_rays(
 ) -> RayHits:
     """Cast every ray; equal to `mj_ray` of each (a test holds that).
 
-    While it runs, `model.geom_group` and `model.body_bvhadr` hold other values: another thread must
-    not step or render the same model meanwhile.
+    While it runs, the model's geom groups, and the bodies' lists of geoms and bounding volumes, hold
+    other values: another thread must not step or render the same model meanwhile.
 
     Args:
       model: The compiled model.
@@ -138,12 +141,16 @@ def cast_rays(
     normal = np.zeros(3 * count)
     reached = _reached(model, data, origin, bundles.planes @ rotation.T, np.flatnonzero(shown))
     groups = np.where(reached, _SHOWN, _HIDDEN).astype(np.int32)
+    bodies = np.flatnonzero(model.body_geomnum)
+    first, number = _runs(reached, model.body_geomadr[bodies])
     busy = reached.any(axis=1)
     mask = np.zeros(6, np.uint8)
     mask[_SHOWN] = 1
-    with _own_culling(model) as geom_group:
+    with _own_culling(model):
         for i in np.flatnonzero(busy).tolist():
-            geom_group[:] = groups[i]
+            model.geom_group[:] = groups[i]
+            model.body_geomadr[bodies] = first[i]
+            model.body_geomnum[bodies] = number[i]
             a, b = int(bundles.starts[i]), int(bundles.starts[i + 1])
             mujoco.mj_multiRay(
                 model,
@@ -162,7 +169,7 @@ def cast_rays(
     normals = normal.reshape(-1, 3)
     # A surface seen from within has its normal turned to whoever looks at it.
     away = np.einsum("ij,ij->i", normals, vectors.reshape(-1, 3)) > 0
-    normals[away] *= -1.0
+    normals *= np.where(away, -1.0, 1.0)[:, None]
     hits = RayHits(np.empty_like(scale), np.empty_like(geom_id), np.empty_like(normals))
     hits.scale[bundles.order] = scale
     hits.geom_id[bundles.order] = geom_id
@@ -236,14 +243,27 @@ def _reached(
     return found
 
 
+def _runs(
+    reached: np.ndarray, starts: Int[np.ndarray, "b"]
+) -> tuple[Int[np.ndarray, "k b"], Int[np.ndarray, "k b"]]:
+    """Of each body's geoms, which begin at `starts`, the first that is reached, and how many to the last."""
+    if not len(starts):
+        return np.zeros((len(reached), 0), np.int32), np.zeros((len(reached), 0), np.int32)
+    index = np.arange(reached.shape[1], dtype=np.int32)
+    first = np.minimum.reduceat(np.where(reached, index, len(index)), starts, axis=1)
+    last = np.maximum.reduceat(np.where(reached, index, -1), starts, axis=1)
+    number = np.maximum(last - first + 1, 0)
+    return np.where(number > 0, first, 0), number
+
+
 @contextmanager
-def _own_culling(model: mujoco.MjModel) -> Iterator[np.ndarray]:
-    """Let `mj_multiRay` test every geom of a group; yields the groups to write to."""
-    groups, volumes = model.geom_group, model.body_bvhadr
-    kept_groups, kept_volumes = groups.copy(), volumes.copy()
+def _own_culling(model: mujoco.MjModel) -> Iterator[None]:
+    """What `mj_multiRay` culls by is as before afterwards; meanwhile nothing is culled by volumes."""
+    changed = (model.geom_group, model.body_geomadr, model.body_geomnum, model.body_bvhadr)
+    kept = [values.copy() for values in changed]
     try:
-        volumes[:] = -1  # a body without bounding volumes is not culled
-        yield groups
+        model.body_bvhadr[:] = -1  # a body without bounding volumes is not culled
+        yield
     finally:
-        groups[:] = kept_groups
-        volumes[:] = kept_volumes
+        for values, before in zip(changed, kept, strict=True):
+            values[:] = before

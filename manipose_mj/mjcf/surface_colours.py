@@ -21,10 +21,14 @@ class SurfaceColours:
     A ray reports no texture coordinates. A plane's follow from the point; a textured mesh is
     sampled densely once and a hit takes the colour of the nearest sample; anything else (cube maps
     on primitives) gets its texture's mean colour.
+
+    Attributes:
+      textured: `(ngeom,)` bool, the geoms whose colour is not the same all over.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
+        self.textured = _texture_of_geom(model) >= 0
         self._lookups: dict[tuple[int, int, int], _Lookup | None] = {}
 
     def at(
@@ -40,10 +44,8 @@ class SurfaceColours:
           points: World frame, on the geoms' surfaces.
           geom_id: The geom of each point, not -1.
         """
-        model = self._model
-        colours = to_linear(geom_colours(model)[:, :3])[geom_id]
-        textured = np.flatnonzero((_texture_of_geom(model) >= 0) & (model.geom_matid >= 0))
-        for geom in np.intersect1d(textured, geom_id):
+        colours = self.plain()[geom_id]
+        for geom in np.unique(geom_id[self.textured[geom_id]]):
             lookup = self._lookup(int(geom))
             if lookup is None:
                 continue
@@ -51,6 +53,10 @@ class SurfaceColours:
             local = (points[rows] - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
             colours[rows] *= lookup(local)
         return colours
+
+    def plain(self) -> Float[np.ndarray, "ngeom 3"]:
+        """The diffuse colours of all geoms but for their textures, linear light, in 0..1."""
+        return to_linear(geom_colours(self._model)[:, :3])
 
     def _lookup(self, geom: int) -> _Lookup | None:
         model = self._model

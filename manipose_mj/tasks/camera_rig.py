@@ -99,6 +99,7 @@ class CameraRig:
         self._owners: Int[np.ndarray, "ngeom"] | None = None
         self._painter: Painter | None = None
         self._colours: SurfaceColours | None = None
+        self._rays: dict[str, tuple[Intrinsics, np.ndarray, np.ndarray]] = {}
         self._model: object = None
         self._seed = 0
 
@@ -143,15 +144,22 @@ class CameraRig:
         """
         self._follow(physics)
         assert self._colours is not None
+        plain = self._cache.get(physics, "plain colours", self._plain_colours)
         frame = self.frame(physics, camera)
         geoms = frame.exact.geom_id.ravel()[pixels]
-        seen = np.flatnonzero(geoms >= 0)
-        depth = frame.exact.depth.ravel()[pixels[seen], None]
-        points = frame.pose[:3, 3] + frame.rays[pixels[seen]] * depth
-        colours = np.zeros((len(pixels), 3), np.uint8)
-        linear = self._colours.at(physics.data.ptr, points, geoms[seen])
-        colours[seen] = np.round(255 * to_display(linear)).astype(np.uint8)
+        colours = plain[geoms]
+        textured = np.flatnonzero(self._colours.textured[geoms] & (geoms >= 0))
+        if len(textured):
+            depth = frame.exact.depth.ravel()[pixels[textured], None]
+            points = frame.pose[:3, 3] + frame.rays[pixels[textured]] * depth
+            linear = self._colours.at(physics.data.ptr, points, geoms[textured])
+            colours[textured] = _as_bytes(linear)
         return colours
+
+    def _plain_colours(self) -> UInt8[np.ndarray, "ngeom1 3"]:
+        """Of all geoms but for textures, and black at the end, which is where nothing, -1, finds it."""
+        assert self._colours is not None
+        return np.pad(_as_bytes(self._colours.plain()), ((0, 1), (0, 0)))
 
     def pose(self, physics: mjcf.Physics, camera: str) -> Float[np.ndarray, "4 4"]:
         """`T_world_camera`, OpenCV's axes."""
@@ -170,8 +178,7 @@ class CameraRig:
         # What has no instance, and what is nothing, is 0.
         instance = np.maximum(pixel_instances(exact.geom_id, self._owners), 0)
         pose, intrinsics = self.pose(physics, camera), self.intrinsics(physics, camera)
-        slopes = intrinsics.slopes().reshape(-1, 2)
-        rays = rotated(np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1), pose[:3, :3])
+        rays = self._world_rays(camera, pose[:3, :3], intrinsics)
         sensor = self._config.depth_sensor
         if sensor is None:
             return Frame(exact.depth, instance, exact, intrinsics, pose, rays)
@@ -182,6 +189,17 @@ class CameraRig:
         noisy = measure(exact.depth.astype(float), cosine, intrinsics, rng, sensor)
         depth = noisy.depth.astype(np.float32)
         return Frame(depth, noisy.moved(instance), exact, intrinsics, pose, rays)
+
+    def _world_rays(
+        self, camera: str, rotation: Float[np.ndarray, "3 3"], intrinsics: Intrinsics
+    ) -> Float[np.ndarray, "pixels 3"]:
+        """Of each pixel, kept for as long as the camera does not turn."""
+        kept = self._rays.get(camera)
+        if kept is None or kept[0] != intrinsics or not np.array_equal(kept[1], rotation):
+            slopes = intrinsics.slopes().reshape(-1, 2)
+            rays = rotated(np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1), rotation)
+            kept = self._rays[camera] = (intrinsics, rotation, rays)
+        return kept[2]
 
     def _painted(self, physics: mjcf.Physics, camera: str) -> np.ndarray:
         self._follow(physics)
@@ -206,6 +224,10 @@ class CameraRig:
     def _bodies(self, physics: mjcf.Physics) -> list[int]:
         frames = [mjcf.get_attachment_frame(e.mjcf_model) for e in self._entities]
         return [int(physics.bind(frame).element_id) for frame in frames]
+
+
+def _as_bytes(linear: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:
+    return np.round(255 * to_display(linear)).astype(np.uint8)
 
 
 def _add_camera(arena: composer.Arena, view: CameraView, known: list[str]) -> None:
