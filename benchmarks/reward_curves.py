@@ -1,6 +1,6 @@
 """Plot the dense reward along the baseline's successes, one panel for each task.
 
-python benchmarks/reward_curves.py --out rewards.png [--only TASK ...] [--episodes 3]
+python benchmarks/reward_curves.py --out rewards.png [--only TASK ...] [--episodes 3] [--jobs N]
 
 Prints, for each success, the rank correlation of reward and time and by how much it falls on the way.
 """
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from joblib import Parallel, delayed
 from scipy.stats import spearmanr
 
 from manipose_mj import suite
@@ -28,6 +29,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--only", nargs="+", default=[], help="domain/task")
     parser.add_argument("--episodes", type=int, default=3, help="seeds to try")
+    parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
     tasks = [t for t in suite.ALL_TASKS if not arguments.only or "/".join(t) in arguments.only]
     columns = min(4, len(tasks))
@@ -35,11 +37,16 @@ def main() -> None:
     figure, axes = plt.subplots(
         rows, columns, figsize=(4 * columns, 2.5 * rows), squeeze=False, sharey=True
     )
+    seeds = range(arguments.episodes)
+    found = Parallel(n_jobs=arguments.jobs)(
+        delayed(_rewards)(task, seed) for task in tasks for seed in seeds
+    )
+    curves = iter(found)
     for axis, task in zip(axes.ravel(), tasks, strict=False):
         axis.set_title("/".join(task), fontsize=8)
         axis.set_ylim(0, 1.02)
-        for seed in range(arguments.episodes):
-            rewards = _rewards(task, seed)
+        for seed in seeds:
+            rewards = next(curves)
             if rewards is None:
                 print(f"{'/'.join(task)} seed {seed}: no success")
                 continue
