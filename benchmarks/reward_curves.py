@@ -38,7 +38,7 @@ def main() -> None:
         rows, columns, figsize=(4 * columns, 2.5 * rows), squeeze=False, sharey=True
     )
     seeds = range(arguments.episodes)
-    found = Parallel(n_jobs=arguments.jobs)(
+    found: list[np.ndarray | None] = Parallel(n_jobs=arguments.jobs)(
         delayed(_rewards)(task, seed) for task in tasks for seed in seeds
     )
     curves = iter(found)
