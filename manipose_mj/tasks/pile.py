@@ -88,10 +88,10 @@ def _dropped(assets: Sequence[Asset], config: PileConfig, rng: np.random.Generat
         scene.drop(order, drop.rotation, drop.xy, _DROP_GAP, _DROP_SPEED)
         scene.run(_FALL_TIME)
     scene.remove_walls()
-    if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread):
+    if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread, tremble=True):
         return None
     scene.step_finely()
-    still = scene.rest(_CALM_TIME, _STILL_TIME, _STILL, config.spread)
+    still = scene.rest(_CALM_TIME, _STILL_TIME, _STILL, config.spread, tremble=False)
     kept = np.flatnonzero(scene.kept)
     if not still or len(kept) < config.count[0] or scene.penetration() > _PENETRATION:
         return None

@@ -118,7 +118,13 @@ class PileScene:
         self._model.opt.timestep = PILE_TIMESTEP
 
     def rest(
-        self, longest: float, still: float, limits: tuple[float, float], spread: float
+        self,
+        longest: float,
+        still: float,
+        limits: tuple[float, float],
+        spread: float,
+        *,
+        tremble: bool,
     ) -> bool:
         """Let time pass until everything has been still for a while; whether it came to that.
 
@@ -127,25 +133,38 @@ class PileScene:
           still: For how long it has to be still [s].
           limits: Of speeds that count as still [m/s, rad/s].
           spread: What gets farther from the middle is taken away [m].
+          tremble: Whether things are still that tremble on the spot, as piles do in coarse steps: speeds are
+            then means over the time between two looks, not those of a moment.
         """
         quiet = 0.0
+        before = self._configurations()
         for _ in range(round(longest / _PIECE)):
             self.run(_PIECE)
             self._take_away(spread)
-            velocity = self._data.qvel.reshape(-1, 6)
-            linear = np.linalg.norm(velocity[:, :3], axis=1).max()
-            angular = np.linalg.norm(velocity[:, 3:], axis=1).max()
+            now = self._configurations()
+            if tremble:
+                linear, angular = _way(before, now) / _PIECE
+            else:
+                velocity = self._data.qvel.reshape(-1, 6)
+                linear = np.linalg.norm(velocity[:, :3], axis=1).max()
+                angular = np.linalg.norm(velocity[:, 3:], axis=1).max()
+            before = now
             quiet = quiet + _PIECE if linear < limits[0] and angular < limits[1] else 0.0
             if quiet > still - 1e-9:
                 return True
         return False
 
+    def _configurations(self) -> Float[np.ndarray, "n 7"]:
+        """Of each thing, its position [m] and quaternion."""
+        rows = self._model.jnt_qposadr[self._joints][:, None] + np.arange(7)
+        return self._data.qpos[rows]
+
     def _take_away(self, spread: float) -> None:
         """Make what rolled away wait again."""
-        for i, pose in enumerate(self.poses()):
-            if self.kept[i] and np.linalg.norm(pose[:2, 3]) > spread:
-                self.kept[i] = False
-                self._park(i)
+        away = np.linalg.norm(self._configurations()[:, :2], axis=1) > spread
+        for i in np.flatnonzero(self.kept & away).tolist():
+            self.kept[i] = False
+            self._park(i)
 
     def _park(self, i: int) -> None:
         """Make an object wait high above, touching nothing, not even the walls, which know no top."""
@@ -245,6 +264,14 @@ class PileScene:
             label = pose @ asset.label.pose
             tops.append(label[2, 3] + np.abs(label[2, :3]) @ asset.label.extents / 2)
         return max(tops)
+
+
+def _way(before: Float[np.ndarray, "n 7"], now: Float[np.ndarray, "n 7"]) -> np.ndarray:
+    """How far anything went at most, and how far it turned, between two configurations [m, rad]."""
+    went = np.linalg.norm(now[:, :3] - before[:, :3], axis=1).max()
+    # A quaternion and its opposite are the same; the chord between two is half the angle, if small.
+    chords = [np.linalg.norm(now[:, 3:] - sign * before[:, 3:], axis=1) for sign in (1, -1)]
+    return np.array([went, 2 * np.min(chords, axis=0).max()])
 
 
 def _compiled(assets: Sequence[Asset], radius: float) -> mujoco.MjModel:
