@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
 from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned, candidates, normal_starts
+from manipose_mj.ppf_jax.close_look import CloseLook, close_rows
 from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
@@ -26,6 +27,8 @@ from manipose_mj.ppf_jax.part_voting import (
 )
 from manipose_mj.ppf_jax.rotations import from_vector
 from manipose_mj.ppf_jax.voting import VotingConfig, vote
+
+_LIKELY = 0.05  # of the surest part's score: the least with which a part is looked at closely
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class ArticulatedConfig:
       network: Sizes of the part network.
       voting: How its votes are counted.
       points: Points that it looks at.
-      focus: How near to a supposed handle points are looked at more closely the second time [m].
+      close: How points are chosen where handles seem to be.
     """
 
     body: NetworkConfig = field(default_factory=lambda: NetworkConfig(anchors=32))
@@ -54,7 +57,7 @@ class ArticulatedConfig:
     network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
-    focus: float = 0.06
+    close: CloseLook = field(default_factory=CloseLook)
 
 
 class PartEstimates(eqx.Module):
@@ -123,7 +126,7 @@ def estimate_parts(
     *,
     key: PRNGKeyArray,
 ) -> PartEstimates:
-    """Settle the body's frame, vote in it for parts, and look again where handles seem to be.
+    """Settle the body's frame, vote in it for parts, and look closely where handles seem to be.
 
     A pure function of one cloud: `vmap` it.
 
@@ -138,7 +141,7 @@ def estimate_parts(
     config = model.config
     body_key, first_key, second_key = jax.random.split(key, 3)
     order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
-    chosen = jnp.argsort(order)[: config.points]
+    chosen = jax.lax.top_k(-order, config.points)[1]
     few = points[chosen], normals[chosen], mask[chosen]
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
     settled = body_rotations(model, *few, key=body_key)
@@ -149,23 +152,23 @@ def estimate_parts(
     rotation = frames[jnp.argmax(logits)]
     cloud, centre = body_cloud(*few, rotation)
     votes = model.parts(cloud, rows)
-    first = find_parts(cloud, votes, config.voting)
+    parts = find_parts(cloud, votes, config.voting)
     turn = from_vector(frame_turn(cloud, votes, config.voting))
-    # The second time, half of the points are from where handles seem to be.
-    own = (points - centre) @ rotation
-    apart = jnp.linalg.norm(own[:, None] - first.centre, axis=-1)
-    likely = first.score > 0.05 * jnp.max(first.score)
-    near = jnp.any((apart < config.focus) & likely, axis=1) & mask
-    again = jax.random.uniform(second_key, mask.shape) + 2.0 * ~mask
-    rank = jnp.argsort(jnp.argsort(jnp.where(near, again, 3.0 + again)))
-    again = jnp.where(near & (rank < config.points // 2), -1.0, again)
-    chosen = jnp.argsort(again)[: config.points]
-    # In random order: the first of them stand for all. Padding comes last.
-    shuffle = jax.random.uniform(second_key, chosen.shape) + 2.0 * ~mask[chosen]
-    chosen = chosen[jnp.argsort(shuffle)]
-    rotation = rotation @ turn
-    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
-    parts = find_parts(cloud, model.parts(cloud), config.voting)
+    for look in range(config.close.looks):
+        chosen = close_rows(
+            points,
+            mask,
+            parts.centre @ rotation.T + centre,
+            parts.rotation[:, :, 1] @ rotation.T,
+            parts.score > _LIKELY * jnp.max(parts.score),
+            config.points,
+            config.close,
+            key=jax.random.fold_in(second_key, look),
+        )
+        rotation = rotation @ turn
+        turn = jnp.eye(3)  # once is enough
+        cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
+        parts = find_parts(cloud, model.parts(cloud), config.voting)
     return _in_camera(parts, rotation, centre, up, model.calibration)
 
 
