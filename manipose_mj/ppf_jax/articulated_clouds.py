@@ -132,20 +132,19 @@ def fused_cloud(scene: FurnitureScene, chosen: Sequence[int]) -> FurnitureCloud:
     rate = min(rate, CLOUD_POINTS / sum(view.pixels for view in views))
     columns: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     for view in views:
-        even = np.zeros(len(view.part), bool)
-        even[: int(rate * view.pixels + 1e-6)] = True
-        rows = even.copy()
-        rows[view.even :] = True
-        turn, shift = np.eye(3, dtype=np.float32), np.zeros(3, np.float32)
+        kept = int(rate * view.pixels + 1e-6)
+        rows = slice(None)
+        if kept < view.even:
+            rows = np.concatenate([np.arange(kept), np.arange(view.even, len(view.part))])
+        points, normals, spots = view.points[rows], view.normals[rows], view.spots
         if view is not views[0]:
             T_first_own = (pose @ invert(view.pose.astype(float))).astype(np.float32)
             turn, shift = T_first_own[:3, :3], T_first_own[:3, 3]
-        columns["points"].append(view.points[rows] @ turn.T + shift)
-        columns["normals"].append(view.normals[rows] @ turn.T)
-        columns["part"].append(view.part[rows])
-        columns["handle"].append(view.handle[rows])
-        columns["even"].append(even[rows])
-        columns["spots"].append(view.spots @ turn.T + np.stack([shift, 0 * shift]))
+            points, normals = points @ turn.T + shift, normals @ turn.T
+            spots = spots @ turn.T + np.stack([shift, 0 * shift])
+        own = (points, normals, view.part[rows], view.handle[rows], np.arange(len(points)) < kept)
+        for name, values in zip(_COLUMNS, (*own, spots), strict=True):
+            columns[name].append(values)
     ends, feet = _landmarks(scene)
     return FurnitureCloud(
         scene=scene,

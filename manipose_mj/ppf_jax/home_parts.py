@@ -156,7 +156,9 @@ def _front(c: Cabinet, y: Span, z: Span, style: str) -> tuple[tuple[Shape, ...],
         return slab(low, high, rgba=c.front_rgba, density=WOOD).visual, 0.0
     inset = min(0.008, c.front / 2)
     pane = Pane(inset, c.front - inset, c.front_rgba, WOOD)
-    panel = framed(low, high, (c.rail,) * 4, pane, rgba=c.front_rgba, density=WOOD)
+    panel = framed(
+        low, high, (c.rail, c.rail, c.rail, c.rail), pane, rgba=c.front_rgba, density=WOOD
+    )
     return panel.visual, inset
 
 
