@@ -25,6 +25,7 @@ CLOUD_POINTS = 65_536  # of a cloud, at most
 # How far from a handle a close look may be, in training: mostly, and as often as `_LOST` says [m].
 _NEAR_OFF, _FAR_OFF, _LOST = 0.010, 0.030, 0.4
 _HEIGHT_OFF = 0.005  # along the handle's Y [m]
+_ASTRAY = 0.15  # share of close looks at nothing but strange places
 _TILT = (0.04, 0.20)  # of what is taken for that Y, mostly and seldom [rad]
 
 
@@ -262,7 +263,8 @@ def _supposed(
     cloud: FurnitureCloud, handles: Float[np.ndarray, "parts 4 4"], rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"]]:
     """Where a first look may take handles to be: most of them, nearly, and some places that are none."""
-    chosen = rng.random(len(handles)) < 0.85
+    # In a wrong frame there may be nothing else.
+    chosen = rng.random(len(handles)) < (0.0 if rng.random() < _ASTRAY else 0.85)
     known, length = handles[chosen], np.array([j.handle_extents[0] for j in cloud.scene.joints])
     far = rng.random((len(known), 1)) < _LOST
     # Along X, Y and Z of the handle; along a long one it is hard to tell where its middle is.

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
@@ -126,7 +126,7 @@ def estimate_parts(
     *,
     key: PRNGKeyArray,
 ) -> PartEstimates:
-    """Settle the body's frame, vote in it for parts, and look closely where handles seem to be.
+    """Find likely frames of the body, vote in each for parts and look closely where handles seem to be.
 
     A pure function of one cloud: `vmap` it.
 
@@ -147,11 +147,43 @@ def estimate_parts(
     settled = body_rotations(model, *few, key=body_key)
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
-    # The likeliest of them is the body's.
     logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)
-    rotation = frames[jnp.argmax(logits)]
+    # A side looks much like a front until its handles are looked at.
+    likely, which = jax.lax.top_k(logits, config.close.frames)
+
+    def closer(frame: Array) -> tuple[Array, PartEstimates]:
+        return look_closely(model, points, normals, mask, few, rows, frame, up, key=second_key)
+
+    again, found = jax.lax.map(closer, frames[which])
+    best = jnp.argmax(likely + again)
+    return jax.tree.map(lambda leaf: leaf[best], found)
+
+
+def look_closely(
+    model: ArticulatedModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    few: tuple[Float[Array, "m 3"], Float[Array, "m 3"], Bool[Array, "m"]],
+    neighbours: tuple[Int[Array, "m k"], ...],
+    rotation: Float[Array, "3 3"],
+    up: Float[Array, "3"],
+    *,
+    key: PRNGKeyArray,
+) -> tuple[Float[Array, ""], PartEstimates]:
+    """The parts in one frame of the body, and how sure a close look is that it is the body's (a logit).
+
+    Args:
+      model: The networks.
+      points, normals, mask, up: As of `estimate_parts`.
+      few: Points, normals and mask of the first look.
+      neighbours: Of these, as the network looks at them.
+      rotation: The frame.
+      key: Draws the points of the close looks.
+    """
+    config = model.config
     cloud, centre = body_cloud(*few, rotation)
-    votes = model.parts(cloud, rows)
+    votes = model.parts(cloud, neighbours)
     parts = find_parts(cloud, votes, config.voting)
     turn = from_vector(frame_turn(cloud, votes, config.voting))
     for look in range(config.close.looks):
@@ -163,13 +195,14 @@ def estimate_parts(
             parts.score > _LIKELY * jnp.max(parts.score),
             config.points,
             config.close,
-            key=jax.random.fold_in(second_key, look),
+            key=jax.random.fold_in(key, look),
         )
         rotation = rotation @ turn
         turn = jnp.eye(3)  # once is enough
         cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
-        parts = find_parts(cloud, model.parts(cloud), config.voting)
-    return _in_camera(parts, rotation, centre, up, model.calibration)
+        votes = model.parts(cloud)
+        parts = find_parts(cloud, votes, config.voting)
+    return votes.frame, _in_camera(parts, rotation, centre, up, model.calibration)
 
 
 def body_rotations(

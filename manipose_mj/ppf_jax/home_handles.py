@@ -68,7 +68,7 @@ def random_handle(rng: np.random.Generator, longest: float) -> Handle:
     if kind == "edge":
         return EdgePull(min(length, 0.4), thickness, thickness, standoff)
     if kind == "block":
-        return BlockHandle(min(length, 0.25), rng.uniform(0.008, 0.03), rng.uniform(0.012, 0.035))
+        return BlockHandle(min(length, 0.25), rng.uniform(0.008, 0.03), rng.uniform(0.010, 0.035))
     if length > 0.25:
         thickness *= rng.uniform(1.0, 2.0)
     inset = thickness / 2 + rng.uniform(0.0, 0.2) * (length - 2 * thickness)

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.articulated.cabinet_sizes import WOOD, Cabinet
 from asset_pipeline.procedural.articulated.front_panel import Pane, framed, slab
+from asset_pipeline.procedural.articulated.knob import Knob
 from asset_pipeline.procedural.articulated.layout import Cell
 from asset_pipeline.procedural.articulated.mounted import Direction, Mounted
 from asset_pipeline.procedural.solids import box
@@ -68,6 +69,8 @@ def drawer(c: Cabinet, cell: Cell, rng: np.random.Generator) -> HomePart:
     direction: Direction = "upright" if rng.random() < 0.05 else "level"
     room = y if direction == "level" else z
     handle = random_handle(rng, room[1] - room[0] - 2 * _MARGIN)
+    if isinstance(handle, Knob):
+        direction = "level"  # nothing else would tell
     # In the middle across; often higher.
     height = 0.5 if rng.random() < 0.6 else rng.uniform(0.3, 0.85)
     along = handle.length / 2 if direction == "upright" else 0.02
@@ -103,6 +106,8 @@ def door(
     direction: Direction = "upright" if upright == (rng.random() < 0.9) else "level"
     room = z if direction == "upright" else y
     handle = random_handle(rng, min(0.8 * (room[1] - room[0]), room[1] - room[0] - 2 * _MARGIN))
+    if isinstance(handle, Knob):
+        direction = "upright" if upright else "level"  # nothing else would tell
     rim = handle.length / 2 if (direction == "upright") != upright else 0.015
     off = max(rng.uniform(0.02, 0.09), rim + _MARGIN / 2)
     off = min(off, 0.5 * (across[1] - across[0]))
