@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ import pytest
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import rotation_about
+from manipose_mj.ppf_jax import articulated_estimator
 from manipose_mj.ppf_jax import articulated_model as module
 from manipose_mj.ppf_jax.articulated_cache import (
     furniture_scenes,
@@ -19,6 +21,7 @@ from manipose_mj.ppf_jax.articulated_cache import (
     random_scene,
 )
 from manipose_mj.ppf_jax.articulated_clouds import (
+    CLOUD_POINTS,
     FurnitureScene,
     batch_furniture,
     fused_cloud,
@@ -311,10 +314,6 @@ def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene,
         estimator.estimate(cloud.points[:count], key=KEY, least=0.0) for count in (300, 999, 999)
     ]
     assert set(traced) == {2048}
-    for count in (2500, 8000):  # one bucket, one trace
-        more = np.tile(cloud.points, (8, 1))[:count]
-        estimator.estimate(more, key=KEY)
-    assert traced.count(8192) == traced.count(2048)
     assert all(len(parts) == CONFIG.voting.parts for parts in answers)
     for part in answers[0]:
         assert np.isfinite(part.handle).all() and np.isfinite(part.axis_origin).all()
@@ -325,6 +324,29 @@ def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene,
         assert part.opening >= 0 and 0 <= part.confidence <= 1
     for one, other in zip(answers[1], answers[2], strict=True):
         assert np.array_equal(one.handle, other.handle)
+
+
+@pytest.mark.parametrize(
+    ("count", "size"),
+    [(300, 2048), (2049, 8192), (9000, 32_768), (65_000, 65_536), (70_000, 65_536)],
+)
+def test_clouds_are_padded_to_few_sizes(estimator, scene, monkeypatch, count, size):
+    """One compilation each; none of a large cloud is dropped."""
+
+    class Enough(Exception):
+        pass
+
+    def stopped(model, points, normals, mask, up, *, key):
+        assert points.shape == normals.shape == (1, size, 3)
+        assert mask.sum() == min(count, CLOUD_POINTS)
+        raise Enough
+
+    monkeypatch.setattr(articulated_estimator, "estimate_furniture", stopped)
+    view = scene.views[0]
+    rows = np.arange(count) % len(view.points)
+    cloud = SimpleNamespace(points=view.points[rows], normals=view.normals[rows])
+    with pytest.raises(Enough):
+        estimator.estimate(cloud, key=KEY)
 
 
 @pytest.mark.parametrize(
