@@ -105,7 +105,8 @@ class ArticulatedEstimator:
           cloud: Points with normals, or points alone: normals are then estimated. Camera frame; fused
             clouds in the frame of one of their cameras, with normals towards whichever saw them.
           key: Of all that is drawn; the same key gives the same answer.
-          up: Roughly which way is up in the camera frame; tells a handle's two directions apart.
+          up: Roughly which way is up in the camera frame, within some 60 deg; tells how the body stands and
+            a handle's two directions apart.
           least: Confidence from which on a part is reported.
 
         Raises:

@@ -28,6 +28,7 @@ from manipose_mj.ppf_jax.part_voting import (
 from manipose_mj.ppf_jax.rotations import from_vector
 from manipose_mj.ppf_jax.voting import VotingConfig, vote
 
+_UPRIGHT = 5.0  # weight of the cosine between what a frame takes for up and what is roughly up
 _LIKELY = 0.05  # of the surest part's score: the least with which a part is looked at closely
 
 
@@ -135,7 +136,8 @@ def estimate_parts(
       points: [m], camera frame, the camera at the origin.
       normals: Unit, towards the camera.
       mask: True for points, false for padding.
-      up: Roughly, camera frame: decides only between a handle's two directions.
+      up: Roughly, camera frame: speaks for frames whose second axis is along it, either way, and decides
+        between a handle's two directions.
       key: Draws the samples and the pairs.
     """
     config = model.config
@@ -148,6 +150,7 @@ def estimate_parts(
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
     logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)
+    logits += _UPRIGHT * jnp.log(jnp.abs(frames[:, :, 1] @ unit(up)) + 0.05)
     # A side looks much like a front until its handles are looked at.
     likely, which = jax.lax.top_k(logits, config.close.frames)
 
