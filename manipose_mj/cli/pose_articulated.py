@@ -19,6 +19,7 @@ def train_articulated(
     out: Annotated[Path, arg(metavar="DIR")] = Path("pose/articulated"),
     scenes: int = 16,
     further: int = 0,
+    home: int = 0,
     batch: int = 32,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -35,6 +36,7 @@ def train_articulated(
       out: Folder to write to.
       scenes: Of each object; a scene has openings of its own and four views.
       further: Objects of each category beyond the built-in ones, to learn from more of them.
+      home: Pieces of furniture for the home to learn from besides: wardrobes, dressers, desks, large appliances.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -44,12 +46,14 @@ def train_articulated(
     """
     one_thread_per_process()
     require_positive(minutes, scenes=scenes, batch=batch, steps=steps)
-    if further < 0:
-        raise InputError(f"--further is {further}; expected 0 or more")
+    for name, count in (("further", further), ("home", home)):
+        if count < 0:
+            raise InputError(f"--{name} is {count}; expected 0 or more")
     import jax
 
     from manipose_mj.cli import output
     from manipose_mj.ppf_jax.articulated_cache import (
+        SCENES_PER_FILE,
         furniture_names,
         furniture_scenes,
         furniture_stream,
@@ -63,7 +67,7 @@ def train_articulated(
     from manipose_mj.ppf_jax.training import CURVE_FILE, Row, TrainingConfig, train
     from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
-    objects = furniture_names("train", further)
+    objects = furniture_names("train", further, home)
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(
             objects,
@@ -72,6 +76,9 @@ def train_articulated(
             jobs=jobs,
             progress=progress.update,
         )
+    # Confidence is about clouds as they come, not as training keeps them.
+    few = objects[:: max(1, len(objects) * SCENES_PER_FILE // _CALIBRATION)]
+    judged = furniture_scenes(few, "front", scenes=SCENES_PER_FILE, jobs=jobs)
     feed = furniture_stream(known, batch, seed)
     if jobs > 1 and jax.default_backend() != "cpu":
         feed = parallel_furniture_stream(
@@ -92,8 +99,7 @@ def train_articulated(
             minutes=minutes,
             progress=show,
         )
-    chosen = known[:: max(1, len(known) // _CALIBRATION)]
-    model = calibrated(model, scene_clouds(chosen, seed=seed))
+    model = calibrated(model, scene_clouds(judged))
     save_weights(out / WEIGHTS_FILE, TrainedModel(model, CATEGORIES))  # pyright: ignore[reportArgumentType]
     draw_curve(out / CURVE_FILE, out / CURVE_PICTURE)
     output.standard_output().print(

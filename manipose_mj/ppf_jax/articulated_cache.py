@@ -24,6 +24,7 @@ from asset_pipeline.cache_root import cache_root
 from asset_pipeline.catalogue import CATALOGUE, Split
 from asset_pipeline.source_hash import source_hash
 from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax import home_furniture
 from manipose_mj.ppf_jax.articulated_clouds import (
     FurnitureBatch,
     FurnitureCloud,
@@ -47,23 +48,30 @@ from manipose_mj.ppf_jax.view_cache import Report
 
 SCENES_PER_FILE = 4
 FRONT_VIEWS = 3  # of each scene
-FORMAT = 1  # of the files, and of how this module seeds them
+FORMAT = 2  # of the files, and of how this module seeds them
 _SINGLE, _TWO = 0.7, 0.85  # shares of clouds of one view; of one or two
 
 
-def furniture_names(split: Split, further: int = 0) -> list[tuple[str, int]]:
+def furniture_names(split: Split, further: int = 0, home: int = 0) -> list[tuple[str, int]]:
     """Category and index of the articulated objects in a split.
 
     Args:
       split: Of the catalogue.
       further: For training, so many more of each category, beyond the built-in ones.
+      home: For training, so many pieces of furniture for the home.
     """
     found = []
     for category in CATEGORIES:
         row = CATALOGUE[category]
         found += [(category, i) for i in range(row.instances) if row.split(i) == split]
         found += [(category, row.instances + i) for i in range(further)]
-    return found
+    return found + [(home_furniture.CATEGORY, i) for i in range(home)]
+
+
+def _subject(category: str, index: int) -> ArticulatedSubject:
+    if category == home_furniture.CATEGORY:
+        return home_furniture.home_furniture(index)
+    return catalogue_furniture(category, index)
 
 
 def furniture_scenes(
@@ -190,7 +198,7 @@ def random_cloud(scene: FurnitureScene, rng: np.random.Generator) -> FurnitureCl
     others = rng.permutation([i for i in range(len(scene.views)) if i != first])
     draw = rng.random()
     more = 0 if draw < _SINGLE else 1 if draw < _TWO else 2
-    return fused_cloud(scene, [first, *others[:more]], rng)
+    return fused_cloud(scene, [first, *others[:more]])
 
 
 def scene_folder(setting: str) -> Path:
@@ -200,15 +208,15 @@ def scene_folder(setting: str) -> Path:
 
 @cache
 def _code_hash(setting: str) -> str:
-    modules = [render_furniture.__module__, *(CATALOGUE[c].module for c in CATEGORIES)]
+    modules = [render_furniture.__module__, home_furniture.__name__]
+    modules += [CATALOGUE[category].module for category in CATEGORIES]
     values = repr(FURNITURE_SETTINGS[setting])
     return source_hash(modules, values, version("numpy"), str(FORMAT))
 
 
 def _files(category: str, index: int, setting: str, scenes: int) -> list[Path]:
-    name = CATALOGUE[category].instance(index)
     count = -(-scenes // SCENES_PER_FILE)
-    return [scene_folder(setting) / f"{name}-{i:03d}.pickle" for i in range(count)]
+    return [scene_folder(setting) / f"{category}-{index:03d}-{i:03d}.pickle" for i in range(count)]
 
 
 def _fill(category: str, index: int, setting: str, scenes: int) -> str:
@@ -216,7 +224,7 @@ def _fill(category: str, index: int, setting: str, scenes: int) -> str:
     files = _files(category, index, setting, scenes)
     missing = [number for number, path in enumerate(files) if not path.is_file()]
     if missing:
-        subject = catalogue_furniture(category, index)
+        subject = _subject(category, index)
         for number in missing:
             rng = np.random.default_rng([zlib.crc32(subject.name.encode()), number])
             first = number * SCENES_PER_FILE
@@ -226,7 +234,7 @@ def _fill(category: str, index: int, setting: str, scenes: int) -> str:
             ]
             with new_cache_file(files[number]) as path:
                 path.write_bytes(pickle.dumps(rendered))
-    return CATALOGUE[category].instance(index)
+    return f"{category} {index}"
 
 
 def _read(category: str, index: int, setting: str, scenes: int) -> list[FurnitureScene]:

@@ -13,16 +13,20 @@ from jaxtyping import Bool, Float, Int
 from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.articulated_subject import JointLabel
-from manipose_mj.ppf_jax.articulated_views import FurnitureView
+from manipose_mj.ppf_jax.close_look import CloseLook, close_training_rows
+from manipose_mj.ppf_jax.furniture_view import SLIP, FurnitureView
 from manipose_mj.ppf_jax.view_settings import TASK_FOVY
 
 Array = Any  # a NumPy or a JAX array
 
 BATCH_POINTS = 2048  # of a cloud as the networks see it
-MAX_PARTS = 8  # of furniture that is trained on
-CLOUD_POINTS = 8192  # of a cloud as it is kept
-# In training, how wide the places are that many points are drawn from, and how far off a handle [m].
-_FOCUS_WIDTH, _FOCUS_OFF = (0.03, 0.10), 0.015
+MAX_PARTS = 12  # of furniture that is trained on
+CLOUD_POINTS = 65_536  # of a cloud, at most
+# How far from a handle a close look may be, in training: mostly, and as often as `_LOST` says [m].
+_NEAR_OFF, _FAR_OFF, _LOST = 0.010, 0.030, 0.4
+_HEIGHT_OFF = 0.005  # along the handle's Y [m]
+_ASTRAY = 0.15  # share of close looks at nothing but strange places
+_TILT = (0.04, 0.20)  # of what is taken for that Y, mostly and seldom [rad]
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,9 @@ class FurnitureCloud:
       handle_pixels: `(parts,)`, how many measured pixels show each handle, as if of 480 rows.
       handle_framed: `(parts,)`, whether both ends of each handle are within some camera's image.
       axis_framed: `(parts,)`, whether the point of each joint's axis that is nearest to the handle is.
+      even: `(n,)`, which points are an even sample of what was seen; the others are more from around
+        handles and spots, for training.
+      spots: `(s, 2, 3)`, other such places [m] and which way is out there.
     """
 
     scene: FurnitureScene
@@ -71,6 +78,8 @@ class FurnitureCloud:
     handle_pixels: Int[np.ndarray, "parts"]
     handle_framed: Bool[np.ndarray, "parts"]
     axis_framed: Bool[np.ndarray, "parts"]
+    even: Bool[np.ndarray, "n"]
+    spots: Float[np.ndarray, "s 2 3"]
 
 
 @jax.tree_util.register_dataclass
@@ -110,40 +119,45 @@ class FurnitureBatch:
         return len(self.points)
 
 
-def fused_cloud(
-    scene: FurnitureScene, chosen: Sequence[int], rng: np.random.Generator
-) -> FurnitureCloud:
+def fused_cloud(scene: FurnitureScene, chosen: Sequence[int]) -> FurnitureCloud:
     """The cloud of some of a scene's views, in the camera frame of the first of them.
 
     Args:
       scene: With its views.
-      chosen: Which of them.
-      rng: Draws at most `CLOUD_POINTS` points.
+      chosen: Which of them; of each, as large a share of what it saw.
     """
     views = [scene.views[i] for i in chosen]
     pose = views[0].pose.astype(float)
-    points, normals = [], []
+    # Rows for a pixel: as many as every view has, and all have room for.
+    rate = min(view.even / view.pixels for view in views)
+    rate = min(rate, CLOUD_POINTS / sum(view.pixels for view in views))
+    columns: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     for view in views:
-        if view is views[0]:
-            points.append(view.points)
-            normals.append(view.normals)
-            continue
-        T_first_own = pose @ invert(view.pose.astype(float))
-        points.append(transform(T_first_own, view.points.astype(float)))
-        normals.append(view.normals @ T_first_own[:3, :3].T)
-    rows = rng.permutation(sum(len(view.points) for view in views))[:CLOUD_POINTS]
+        kept = int(rate * view.pixels + 1e-6)
+        rows = slice(None)
+        if kept < view.even:
+            rows = np.concatenate([np.arange(kept), np.arange(view.even, len(view.part))])
+        points, normals, spots = view.points[rows], view.normals[rows], view.spots
+        if view is not views[0]:
+            T_first_own = (pose @ invert(view.pose.astype(float))).astype(np.float32)
+            turn, shift = T_first_own[:3, :3], T_first_own[:3, 3]
+            points, normals = points @ turn.T + shift, normals @ turn.T
+            spots = spots @ turn.T + np.stack([shift, 0 * shift])
+        own = (points, normals, view.part[rows], view.handle[rows], np.arange(len(points)) < kept)
+        for name, values in zip(_COLUMNS, (*own, spots), strict=True):
+            columns[name].append(values)
     ends, feet = _landmarks(scene)
     return FurnitureCloud(
         scene=scene,
-        points=np.concatenate(points)[rows].astype(np.float32),
-        normals=np.concatenate(normals)[rows].astype(np.float32),
-        part=np.concatenate([view.part for view in views])[rows],
-        handle=np.concatenate([view.handle for view in views])[rows],
         pose=pose,
         handle_pixels=np.sum([view.handle_pixels for view in views], axis=0),
         handle_framed=np.any([_framed(view, ends).all(axis=1) for view in views], axis=0),
         axis_framed=np.any([_framed(view, feet) for view in views], axis=0),
+        **{name: np.concatenate(rows) for name, rows in columns.items()},
     )
+
+
+_COLUMNS = ("points", "normals", "part", "handle", "even", "spots")
 
 
 def _landmarks(
@@ -184,15 +198,14 @@ def batch_furniture(
     parts: int = MAX_PARTS,
     focus: float = 0.5,
 ) -> FurnitureBatch:
-    """A batch with `points` points of every cloud; in some, half of them from around a few places.
+    """A batch with `points` points of every cloud: some evenly drawn, some as a close look has them.
 
     Args:
       clouds: At least one.
       rng: Draws the points.
       points: Rows of each cloud.
       parts: Rows of each cloud's parts.
-      focus: Share of the clouds of which many points are drawn about handles, as an estimator does that
-        looks again where it takes handles to be.
+      focus: Share of the clouds of the second kind.
 
     Raises:
       InputError: No clouds, or one of furniture with more than `parts` parts.
@@ -211,9 +224,12 @@ def _row(
         raise InputError(f"{scene.name} has {count} parts with handles; expected at most {parts}")
     handles = handle_poses(cloud)
     if focused:
-        chosen = _focused(cloud, handles[:, :3, 3], points, rng)
+        places, outward = _supposed(cloud, handles, rng)
+        chosen = close_training_rows(
+            cloud.points, cloud.even, places, outward, points, CloseLook(), rng
+        )
     else:
-        chosen = rng.permutation(len(cloud.points))[:points]
+        chosen = rng.permutation(np.flatnonzero(cloud.even))[:points]
     room = points - len(chosen)
     rotation = cloud.pose[:3, :3]
 
@@ -243,21 +259,23 @@ def _row(
     }
 
 
-def _focused(
-    cloud: FurnitureCloud,
-    centres: Float[np.ndarray, "parts 3"],
-    count: int,
-    rng: np.random.Generator,
-) -> Int[np.ndarray, "count"]:
-    """Rows of which about half are near some handles, or a place that is mistaken for one."""
-    some = centres[rng.random(len(centres)) < 0.8]
-    strange = cloud.points[rng.integers(len(cloud.points), size=1 + int(rng.integers(2)))]
-    places = np.concatenate([some + rng.normal(0.0, _FOCUS_OFF, some.shape), strange])
-    width = rng.uniform(*_FOCUS_WIDTH)
-    apart = np.linalg.norm(cloud.points[:, None] - places, axis=-1).min(axis=1)
-    near = np.flatnonzero(apart < width)
-    near = rng.permutation(near)[: count // 2]
-    left = np.ones(len(cloud.points), bool)
-    left[near] = False
-    rest = rng.permutation(np.flatnonzero(left))[: count - len(near)]
-    return rng.permutation(np.concatenate([near, rest]))
+def _supposed(
+    cloud: FurnitureCloud, handles: Float[np.ndarray, "parts 4 4"], rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"]]:
+    """Where a first look may take handles to be: most of them, nearly, and some places that are none."""
+    # In a wrong frame there may be nothing else.
+    chosen = rng.random(len(handles)) < (0.0 if rng.random() < _ASTRAY else 0.85)
+    known, length = handles[chosen], np.array([j.handle_extents[0] for j in cloud.scene.joints])
+    far = rng.random((len(known), 1)) < _LOST
+    # Along X, Y and Z of the handle; along a long one it is hard to tell where its middle is.
+    off = np.where(far, _FAR_OFF, _NEAR_OFF) * rng.normal(0.0, 1.0, (len(known), 3))
+    off[:, 0] += 0.1 * length[chosen] * rng.normal(0.0, 1.0, len(known))
+    off[:, 1] = _HEIGHT_OFF * rng.normal(0.0, 1.0, len(known))
+    off *= np.minimum(1.0, SLIP / (np.linalg.norm(off, axis=1, keepdims=True) + 1e-9))
+    places = known[:, :3, 3] + np.einsum("kij,kj->ki", known[:, :3, :3], off)
+    strange = cloud.spots[rng.permutation(len(cloud.spots))[: 1 + int(rng.integers(3))]]
+    places = np.concatenate([places, strange[:, 0]])
+    outward = np.concatenate([known[:, :3, 1], strange[:, 1]])
+    tilt = np.where(rng.random((len(outward), 1)) < 0.8, *_TILT)
+    outward = outward + tilt * rng.normal(0.0, 1.0, outward.shape)
+    return places, outward / np.linalg.norm(outward, axis=1, keepdims=True)

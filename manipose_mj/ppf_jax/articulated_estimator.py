@@ -22,7 +22,12 @@ from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.weights import load_weights
 
 WEIGHTS = "furniture.npz"
-BUCKETS = (2048, 4096, CLOUD_POINTS)  # sizes that clouds are padded to; one compilation each
+BUCKETS = (
+    2048,
+    8192,
+    32_768,
+    CLOUD_POINTS,
+)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 256
 CAMERA_UP = (0.0, -1.0, 0.0)  # of an upright camera, whose y is down
 _LONGEST, _SHORTEST = 12.0, 0.05  # of clouds of furniture that can be in metres [m]
@@ -100,7 +105,8 @@ class ArticulatedEstimator:
           cloud: Points with normals, or points alone: normals are then estimated. Camera frame; fused
             clouds in the frame of one of their cameras, with normals towards whichever saw them.
           key: Of all that is drawn; the same key gives the same answer.
-          up: Roughly which way is up in the camera frame; tells a handle's two directions apart.
+          up: Roughly which way is up in the camera frame, within some 60 deg; tells how the body stands and
+            a handle's two directions apart.
           least: Confidence from which on a part is reported.
 
         Raises:

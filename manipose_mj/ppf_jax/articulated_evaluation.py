@@ -38,12 +38,9 @@ class Evaluated:
     clouds: int
 
 
-def scene_clouds(
-    scenes: Sequence[FurnitureScene], *, fused: int = 1, seed: int = 0
-) -> list[FurnitureCloud]:
+def scene_clouds(scenes: Sequence[FurnitureScene], *, fused: int = 1) -> list[FurnitureCloud]:
     """One cloud of each scene, of its first `fused` front views."""
-    rng = np.random.default_rng(seed)
-    return [fused_cloud(scene, range(min(fused, FRONT_VIEWS)), rng) for scene in scenes]
+    return [fused_cloud(scene, range(min(fused, FRONT_VIEWS))) for scene in scenes]
 
 
 def evaluated(

@@ -8,11 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
 from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned, candidates, normal_starts
+from manipose_mj.ppf_jax.close_look import CloseLook, close_rows
 from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
@@ -26,6 +27,9 @@ from manipose_mj.ppf_jax.part_voting import (
 )
 from manipose_mj.ppf_jax.rotations import from_vector
 from manipose_mj.ppf_jax.voting import VotingConfig, vote
+
+_UPRIGHT = 5.0  # weight of the cosine between what a frame takes for up and what is roughly up
+_LIKELY = 0.05  # of the surest part's score: the least with which a part is looked at closely
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class ArticulatedConfig:
       network: Sizes of the part network.
       voting: How its votes are counted.
       points: Points that it looks at.
-      focus: How near to a supposed handle points are looked at more closely the second time [m].
+      close: How points are chosen where handles seem to be.
     """
 
     body: NetworkConfig = field(default_factory=lambda: NetworkConfig(anchors=32))
@@ -54,7 +58,7 @@ class ArticulatedConfig:
     network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
-    focus: float = 0.06
+    close: CloseLook = field(default_factory=CloseLook)
 
 
 class PartEstimates(eqx.Module):
@@ -123,7 +127,7 @@ def estimate_parts(
     *,
     key: PRNGKeyArray,
 ) -> PartEstimates:
-    """Settle the body's frame, vote in it for parts, and look again where handles seem to be.
+    """Find likely frames of the body, vote in each for parts and look closely where handles seem to be.
 
     A pure function of one cloud: `vmap` it.
 
@@ -132,41 +136,76 @@ def estimate_parts(
       points: [m], camera frame, the camera at the origin.
       normals: Unit, towards the camera.
       mask: True for points, false for padding.
-      up: Roughly, camera frame: decides only between a handle's two directions.
+      up: Roughly, camera frame: speaks for frames whose second axis is along it, either way, and decides
+        between a handle's two directions.
       key: Draws the samples and the pairs.
     """
     config = model.config
     body_key, first_key, second_key = jax.random.split(key, 3)
     order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
-    chosen = jnp.argsort(order)[: config.points]
+    chosen = jax.lax.top_k(-order, config.points)[1]
     few = points[chosen], normals[chosen], mask[chosen]
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
     settled = body_rotations(model, *few, key=body_key)
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
-    # The likeliest of them is the body's.
     logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)
-    rotation = frames[jnp.argmax(logits)]
+    logits += _UPRIGHT * jnp.log(jnp.abs(frames[:, :, 1] @ unit(up)) + 0.05)
+    # A side looks much like a front until its handles are looked at.
+    likely, which = jax.lax.top_k(logits, config.close.frames)
+
+    def closer(frame: Array) -> tuple[Array, PartEstimates]:
+        return look_closely(model, points, normals, mask, few, rows, frame, up, key=second_key)
+
+    again, found = jax.lax.map(closer, frames[which])
+    best = jnp.argmax(likely + again)
+    return jax.tree.map(lambda leaf: leaf[best], found)
+
+
+def look_closely(
+    model: ArticulatedModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    few: tuple[Float[Array, "m 3"], Float[Array, "m 3"], Bool[Array, "m"]],
+    neighbours: tuple[Int[Array, "m k"], ...],
+    rotation: Float[Array, "3 3"],
+    up: Float[Array, "3"],
+    *,
+    key: PRNGKeyArray,
+) -> tuple[Float[Array, ""], PartEstimates]:
+    """The parts in one frame of the body, and how sure a close look is that it is the body's (a logit).
+
+    Args:
+      model: The networks.
+      points, normals, mask, up: As of `estimate_parts`.
+      few: Points, normals and mask of the first look.
+      neighbours: Of these, as the network looks at them.
+      rotation: The frame.
+      key: Draws the points of the close looks.
+    """
+    config = model.config
     cloud, centre = body_cloud(*few, rotation)
-    votes = model.parts(cloud, rows)
-    first = find_parts(cloud, votes, config.voting)
+    votes = model.parts(cloud, neighbours)
+    parts = find_parts(cloud, votes, config.voting)
     turn = from_vector(frame_turn(cloud, votes, config.voting))
-    # The second time, half of the points are from where handles seem to be.
-    own = (points - centre) @ rotation
-    apart = jnp.linalg.norm(own[:, None] - first.centre, axis=-1)
-    likely = first.score > 0.05 * jnp.max(first.score)
-    near = jnp.any((apart < config.focus) & likely, axis=1) & mask
-    again = jax.random.uniform(second_key, mask.shape) + 2.0 * ~mask
-    rank = jnp.argsort(jnp.argsort(jnp.where(near, again, 3.0 + again)))
-    again = jnp.where(near & (rank < config.points // 2), -1.0, again)
-    chosen = jnp.argsort(again)[: config.points]
-    # In random order: the first of them stand for all. Padding comes last.
-    shuffle = jax.random.uniform(second_key, chosen.shape) + 2.0 * ~mask[chosen]
-    chosen = chosen[jnp.argsort(shuffle)]
-    rotation = rotation @ turn
-    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
-    parts = find_parts(cloud, model.parts(cloud), config.voting)
-    return _in_camera(parts, rotation, centre, up, model.calibration)
+    for look in range(config.close.looks):
+        chosen = close_rows(
+            points,
+            mask,
+            parts.centre @ rotation.T + centre,
+            parts.rotation[:, :, 1] @ rotation.T,
+            parts.score > _LIKELY * jnp.max(parts.score),
+            config.points,
+            config.close,
+            key=jax.random.fold_in(key, look),
+        )
+        rotation = rotation @ turn
+        turn = jnp.eye(3)  # once is enough
+        cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
+        votes = model.parts(cloud)
+        parts = find_parts(cloud, votes, config.voting)
+    return votes.frame, _in_camera(parts, rotation, centre, up, model.calibration)
 
 
 def body_rotations(

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from scipy.ndimage import zoom
 
 from manipose_mj.errors import InputError
@@ -20,10 +20,16 @@ from manipose_mj.mjcf.depth_normals import depth_normals
 from manipose_mj.mjcf.ray_camera import Intrinsics
 from manipose_mj.poses import compose, invert, rotation_about, transform
 from manipose_mj.ppf_jax.articulated_subject import ArticulatedSubject
+from manipose_mj.ppf_jax.close_look import CloseLook
+from manipose_mj.ppf_jax.furniture_view import (
+    FurnitureView,
+    kept_directions,
+    kept_places,
+    thinned,
+)
 from manipose_mj.ppf_jax.rasteriser import Triangles, pixel_rays, rasterise
 from manipose_mj.ppf_jax.view_settings import task_intrinsics
 
-VIEW_POINTS = 6144  # of a view, at most
 TABLE_ITEM = 0  # what a pixel shows: the table, the base, or a part's index and 2
 BASE_ITEM = 1
 _MARGIN = 12  # around the object [pixels]
@@ -31,6 +37,8 @@ _SLACK = 0.005  # around a handle's box, for noise [m]
 _NEAREST = 0.3  # of anything drawn [m]
 _BLEED = 0.7  # how far the segmentation's outline strays [pixels at 480 rows]
 _DRAWS = 60
+_SPOTS = 3  # of a view, besides handles
+_ABOVE = 0.03  # the surface they are, at most [m]
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,8 @@ class FurnitureSetting:
       distance: To that point, uniform [m].
       shut: Share of parts that are shut, besides the scenes in which all are.
       all_shut: Share of scenes in which everything is shut.
+      points: Of a view, at most: an even sample.
+      close: Whether many more points are kept around handles, and around other spots as well.
     """
 
     image_heights: tuple[int, ...] = (480,)
@@ -52,33 +62,14 @@ class FurnitureSetting:
     distance: tuple[float, float] = (0.6, 1.6)
     shut: float = 0.4
     all_shut: float = 0.2
+    points: int = 65_536
+    close: bool = False
 
 
 FURNITURE_SETTINGS: dict[str, FurnitureSetting] = {
     "front": FurnitureSetting(),
-    "training": FurnitureSetting(image_heights=(240, 240, 240, 480)),
+    "training": FurnitureSetting(image_heights=(240, 240, 480), points=4096, close=True),
 }
-
-
-@dataclass(frozen=True)
-class FurnitureView:
-    """What one camera saw of one piece of furniture.
-
-    Attributes:
-      points: `(n, 3)` float32 [m], camera frame.
-      normals: `(n, 3)` float32, unit, towards the camera.
-      part: `(n,)` int8, the part that a point belongs to; -1 for the base and for strays.
-      handle: `(n,)`, whether the point is on that part's handle.
-      pose: `(4, 4)` float32, `T_camera_object`.
-      handle_pixels: `(parts,)` int32, how many measured pixels show each handle, as if of 480 rows.
-    """
-
-    points: Float[np.ndarray, "n 3"]
-    normals: Float[np.ndarray, "n 3"]
-    part: Int[np.ndarray, "n"]
-    handle: Bool[np.ndarray, "n"]
-    pose: Float[np.ndarray, "4 4"]
-    handle_pixels: Int[np.ndarray, "parts"]
 
 
 def random_openings(
@@ -116,8 +107,8 @@ def render_furniture(
     """
     for _ in range(_DRAWS):
         pose, height = _camera(subject, setting, placement, rng)
-        view = view_from(subject, openings, pose, height, rng)
-        if view is not None and len(view.points) >= least:
+        view = view_from(subject, openings, pose, height, rng, setting)
+        if view is not None and len(view.places) >= least:
             return view
     raise InputError(
         f"{subject.name}: {_DRAWS} views in a row show fewer than {least} points; is it in metres?"
@@ -130,6 +121,7 @@ def view_from(
     T_camera_object: Float[np.ndarray, "4 4"],
     height: int,
     rng: np.random.Generator,
+    setting: FurnitureSetting,
 ) -> FurnitureView | None:
     """What a camera sees from a given place; None if a part is too near to it or nothing is seen."""
     motions = [joint.motion(q) for joint, q in zip(subject.joints, openings, strict=True)]
@@ -163,14 +155,33 @@ def view_from(
         inside = np.all(np.abs(local) < joint.handle_extents / 2 + _SLACK, axis=1)
         handle[np.flatnonzero(own)[inside]] = True
         counts[i] = round(int(inside.sum()) * (480 / height) ** 2)
-    rows = rng.permutation(len(pixels))[:VIEW_POINTS]
+    spots = np.zeros((0, 2, 3))
+    if setting.close:
+        grips = np.array(
+            [T_camera_object @ m @ j.handle for m, j in zip(motions, subject.joints, strict=True)]
+        )
+        handles = np.stack([grips[:, :3, 3], grips[:, :3, 1]], axis=1)
+        front = (T_camera_object[:3, :3] @ subject.label.rotation)[:, 1]
+        ways = np.concatenate([handles[:, 1], front[None]])  # of the parts, and of the base
+        seen = rng.integers(len(points), size=_SPOTS)
+        above = rng.uniform(0.0, _ABOVE, (_SPOTS, 1)) * ways[part[seen]]
+        spots = np.stack([points[seen] + above, ways[part[seen]]], axis=1)
+        rows, even = thinned(
+            points, np.concatenate([handles, spots]), setting.points, CloseLook(), rng
+        )
+    else:
+        rows = rng.permutation(len(pixels))[: setting.points]
+        even = len(rows)
     return FurnitureView(
-        points=points[rows].astype(np.float32),
-        normals=depth_normals(depth, mask, pixels[rows], k).astype(np.float32),
+        places=kept_places(points[rows]),
+        directions=kept_directions(depth_normals(depth, mask, pixels[rows], k)),
         part=part[rows].astype(np.int8),
         handle=handle[rows],
         pose=T_camera_object.astype(np.float32),
         handle_pixels=counts,
+        even=even,
+        pixels=len(pixels) * (480 / height) ** 2,
+        spots=spots.astype(np.float32),
     )
 
 

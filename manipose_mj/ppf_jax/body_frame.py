@@ -1,6 +1,6 @@
 """The frame of a piece of furniture: which way its front looks, and how it is turned about that.
 
-X' looks out of the front, Y' is up or down: gravity is not given, and a chest of drawers looks much the
+X' looks out of the front, Y' is up or down, whichever: a chest of drawers looks much the
 same upside down. Pairs vote for both; then the normals, nearly all of which are along an axis, settle it.
 """
 

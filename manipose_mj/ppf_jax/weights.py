@@ -19,6 +19,7 @@ import numpy as np
 
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
+from manipose_mj.ppf_jax.close_look import CloseLook
 from manipose_mj.ppf_jax.cppf import CppfModel
 from manipose_mj.ppf_jax.cppf_voting import CppfConfig
 from manipose_mj.ppf_jax.model import EstimatingModel, ModelConfig, PoseModel
@@ -155,7 +156,10 @@ def _articulated_config(stored: dict[str, Any]) -> ArticulatedConfig:
         "body_voting": VotingConfig(**stored["body_voting"]),
         "network": PartNetworkConfig(**_tuples(stored["network"])),
         "voting": PartVotingConfig(**stored["voting"]),
+        "close": CloseLook(**stored.get("close", {})),
     }
+    # Older files have the radius of another kind of second look.
+    stored = {name: value for name, value in stored.items() if name != "focus"}
     return ArticulatedConfig(**_tuples(stored | own))
 
 

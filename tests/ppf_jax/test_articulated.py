@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ import pytest
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import rotation_about
+from manipose_mj.ppf_jax import articulated_estimator
 from manipose_mj.ppf_jax import articulated_model as module
 from manipose_mj.ppf_jax.articulated_cache import (
     furniture_scenes,
@@ -19,6 +21,7 @@ from manipose_mj.ppf_jax.articulated_cache import (
     random_scene,
 )
 from manipose_mj.ppf_jax.articulated_clouds import (
+    CLOUD_POINTS,
     FurnitureScene,
     batch_furniture,
     fused_cloud,
@@ -73,7 +76,7 @@ def scene(cabinet) -> FurnitureScene:
 def sample(scene):
     """One row of a batch, all of whose parts stand open."""
     rng = np.random.default_rng(0)
-    batch = batch_furniture([fused_cloud(scene, [0, 1], rng)], rng=rng, points=1024, focus=1.0)
+    batch = batch_furniture([fused_cloud(scene, [0, 1])], rng=rng, points=1024, focus=1.0)
     return jax.tree.map(lambda leaf: jnp.asarray(leaf[0]), batch)
 
 
@@ -100,7 +103,7 @@ def test_points_on_handles_are_where_handles_are(cabinet):
     view = render_furniture(cabinet, openings, setting, rng)
     assert view.handle.any() and (view.part[view.handle] >= 0).all()
     scene = FurnitureScene("a/0", "cabinet", cabinet.label.pose, cabinet.joints, openings, (view,))
-    cloud = fused_cloud(scene, [0], rng)
+    cloud = fused_cloud(scene, [0])
     for i, pose in enumerate(handle_poses(cloud)):
         own = cloud.points[cloud.handle & (cloud.part == i)]
         if len(own):
@@ -111,7 +114,7 @@ def test_points_on_handles_are_where_handles_are(cabinet):
 
 def test_fused_views_agree(scene):
     """Points of two cameras lie on the same handles once they are in one frame."""
-    cloud = fused_cloud(scene, [0, 1, 2], np.random.default_rng(0))
+    cloud = fused_cloud(scene, [0, 1, 2])
     assert len(cloud.points) > len(scene.views[0].points)
     poses = handle_poses(cloud)
     for i in range(len(poses)):
@@ -276,7 +279,7 @@ def _exact(cloud) -> list[PartEstimate]:
 
 
 def test_errors_are_what_estimates_are_off_by(scene):
-    cloud = fused_cloud(scene, [0, 1, 2], np.random.default_rng(0))
+    cloud = fused_cloud(scene, [0, 1, 2])
     estimates = _exact(cloud)
     errors, strange = part_errors(cloud, estimates[::-1], least_pixels=0)
     assert strange == 0 and len(errors) == len(scene.joints)
@@ -299,7 +302,7 @@ def test_errors_are_what_estimates_are_off_by(scene):
 
 
 def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene, monkeypatch):
-    cloud = fused_cloud(scene, [0], np.random.default_rng(0))
+    cloud = fused_cloud(scene, [0])
     traced = []
     whole = module.estimate_parts
     monkeypatch.setattr(
@@ -321,6 +324,29 @@ def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene,
         assert part.opening >= 0 and 0 <= part.confidence <= 1
     for one, other in zip(answers[1], answers[2], strict=True):
         assert np.array_equal(one.handle, other.handle)
+
+
+@pytest.mark.parametrize(
+    ("count", "size"),
+    [(300, 2048), (2049, 8192), (9000, 32_768), (65_000, 65_536), (70_000, 65_536)],
+)
+def test_clouds_are_padded_to_few_sizes(estimator, scene, monkeypatch, count, size):
+    """One compilation each; none of a large cloud is dropped."""
+
+    class Enough(Exception):
+        pass
+
+    def stopped(model, points, normals, mask, up, *, key):
+        assert points.shape == normals.shape == (1, size, 3)
+        assert mask.sum() == min(count, CLOUD_POINTS)
+        raise Enough
+
+    monkeypatch.setattr(articulated_estimator, "estimate_furniture", stopped)
+    view = scene.views[0]
+    rows = np.arange(count) % len(view.points)
+    cloud = SimpleNamespace(points=view.points[rows], normals=view.normals[rows])
+    with pytest.raises(Enough):
+        estimator.estimate(cloud, key=KEY)
 
 
 @pytest.mark.parametrize(
