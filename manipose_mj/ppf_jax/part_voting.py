@@ -14,6 +14,7 @@ from manipose_mj.ppf_jax.part_network import LENGTH, SLIDE_LENGTH, TURN, BodyClo
 
 EVIDENCE = 4
 _OUTERMOST = 0.02  # share of the points on a handle that may be strays, at each end
+_NOWHERE = 1e3  # [m], where no point votes for
 _PANEL = 0.05  # weight of points that are not on a handle where centres are looked for
 
 
@@ -25,7 +26,9 @@ class PartVotingConfig:
       parts: Most that are found.
       candidates: Points whose voted centres are tried.
       width: Of the kernel that counts voted centres together [m].
-      separation: Between handles, at least [m].
+      separation: Between voted centres that are taken for two handles, at least [m].
+      along, across: Two parts whose handles are less apart than this, along the handle of the surer one and
+        across it, are one [m]: votes for the middle of a bar that is seen in part spread along it.
       reach: How far from a part's centre a point may vote to take part in the part's estimate [m].
       snap: Directions that are this near to an axis of the body, or of the joint, are along it [rad].
       panel: Weight of votes for a handle's centre from points that are not on one.
@@ -38,6 +41,8 @@ class PartVotingConfig:
     candidates: int = 256
     width: float = 0.015
     separation: float = 0.04
+    along: float = 0.10
+    across: float = 0.02
     reach: float = 0.06
     snap: float = float(np.radians(20.0))
     panel: float = 0.01
@@ -82,11 +87,14 @@ def find_parts(cloud: BodyCloud, votes: PointVotes, config: PartVotingConfig) ->
     """
     centres, weight = centre_votes(cloud, votes)
     peaks, scores = _peaks(centres, weight, config)
-    apart = jnp.linalg.norm(centres[:, None] - peaks, axis=-1)  # (n, k)
-    nearest = jnp.argmin(apart, axis=1)
-    member = (apart < config.reach) & (nearest[:, None] == jnp.arange(config.parts))
-    own = jax.vmap(lambda rows, peak: _part(cloud, votes, centres, rows, peak, config))
-    rotation, centre, hinge, axis, line, opening, spread, handle = own(member.T, peaks)
+    seen = _around(cloud, votes, centres, peaks, config)
+    again = _seen_before(seen[1], seen[0][:, :, 0], scores, config)
+    # What was taken for two parts votes together.
+    peaks, scores = jnp.where(again[:, None], _NOWHERE, peaks), jnp.where(again, 0.0, scores)
+    found = _around(cloud, votes, centres, peaks, config)
+    rotation, centre, hinge, axis, line, opening, spread, handle = found
+    again = _seen_before(centre, rotation[:, :, 0], scores, config)
+    scores, handle = (jnp.where(again, 0.0, value) for value in (scores, handle))
     evidence = jnp.stack(
         [
             jnp.log(scores + 1.0),
@@ -97,6 +105,36 @@ def find_parts(cloud: BodyCloud, votes: PointVotes, config: PartVotingConfig) ->
         axis=-1,
     )
     return Parts(rotation, centre, hinge, axis, line, opening, scores, evidence)
+
+
+def _around(
+    cloud: BodyCloud,
+    votes: PointVotes,
+    centres: Float[Array, "n 3"],
+    peaks: Float[Array, "k 3"],
+    config: PartVotingConfig,
+) -> tuple[Array, ...]:
+    """`_part` for each peak, by the points whose voted centres are nearer to it than to the others."""
+    apart = jnp.linalg.norm(centres[:, None] - peaks, axis=-1)  # (n, k)
+    nearest = jnp.argmin(apart, axis=1)
+    member = (apart < config.reach) & (nearest[:, None] == jnp.arange(config.parts))
+    own = jax.vmap(lambda rows, peak: _part(cloud, votes, centres, rows, peak, config))
+    return own(member.T, peaks)
+
+
+def _seen_before(
+    centre: Float[Array, "k 3"],
+    x: Float[Array, "k 3"],
+    score: Float[Array, "k"],
+    config: PartVotingConfig,
+) -> Bool[Array, "k"]:
+    """Which parts are a surer one once more."""
+    offset = centre[:, None] - centre  # from the second to the first
+    along = jnp.sum(offset * x, axis=-1)
+    across = jnp.linalg.norm(offset - along[..., None] * x, axis=-1)
+    same = (jnp.abs(along) < config.along) & (across < config.across)
+    same = same | (jnp.linalg.norm(offset, axis=-1) < config.separation)
+    return jnp.any(same & (score > score[:, None]), axis=1)
 
 
 def centre_votes(

@@ -198,18 +198,39 @@ def test_a_short_handle_s_middle_is_between_its_ends(sample):
         x, points = np.asarray(targets["x"][row]), np.asarray(cloud.points)[own]
         middle = np.mean([(points @ x).min(), (points @ x).max()])
         length = np.ptp(points @ x)
-        if own.sum() < 20:
+        if own.sum() < 20 or tried == 2:
             continue
         tried += 1
         for short in (2 * length, 0.5 * length):
             config = PartVotingConfig(snap=0.0, short=float(short))
-            parts = find_parts(cloud, votes, config)
+            parts = jax.jit(find_parts, static_argnums=2)(cloud, votes, config)
             voted = np.asarray(cloud.points[row] + LENGTH * targets["centre"][row])
             apart = np.linalg.norm(np.asarray(parts.centre) - voted, axis=1)
             centre = np.asarray(parts.centre[int(np.argmin(apart))])
             target = middle if short > length else voted @ x
             assert centre @ x == pytest.approx(target, abs=0.004)
     assert tried
+
+
+@pytest.mark.parametrize(("across", "parts"), [(False, 1), (True, 2)])
+def test_votes_spread_along_a_handle_are_one_part_and_across_it_two(sample, across, parts):
+    """Half of a handle's points say 3 cm this way, half that way."""
+    cloud, targets, known = varied(
+        sample, ArticulatedLoss(rolled=0.0, strange=0.0, stretch=0.0), key=jax.random.key(0)
+    )
+    on = np.asarray(known["classes"]) == 2
+    of = np.asarray(sample.part)
+    part = np.bincount(of[on]).argmax()
+    row = int(np.argmax(on & (of == part)))
+    x, y = (np.asarray(targets[name][row]) for name in ("x", "y"))
+    way = np.cross(x, y) if across else x
+    sides = np.where(np.arange(len(of)) % 2 == 0, 0.03, -0.03)[:, None] / LENGTH
+    targets["centre"] = targets["centre"] + sides * way
+    own = jnp.asarray(of == part)
+    known = {name: jnp.where(own, value, 0) for name, value in known.items()}
+    config = PartVotingConfig(snap=0.0, short=0.0)
+    found = jax.jit(find_parts, static_argnums=2)(cloud, _true_votes(targets, known), config)
+    assert int(jnp.sum(found.evidence[:, 2] > 0)) == parts
 
 
 def test_planes_settle_the_frame():
