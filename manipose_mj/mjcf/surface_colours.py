@@ -23,7 +23,7 @@ class SurfaceColours:
     on primitives) gets its texture's mean colour.
 
     Attributes:
-      textured: `(ngeom,)` bool, the geoms whose colour is not the same all over.
+      textured: `(ngeom,)` bool, the geoms that have a texture.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -22,12 +22,8 @@ from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.weights import load_weights
 
 WEIGHTS = "furniture.npz"
-BUCKETS = (
-    2048,
-    8192,
-    32_768,
-    CLOUD_POINTS,
-)  # sizes that clouds are padded to; one compilation each
+# Sizes that clouds are padded to; one compilation each.
+BUCKETS = (2048, 8192, 32_768, CLOUD_POINTS)
 MIN_POINTS = 256
 CAMERA_UP = (0.0, -1.0, 0.0)  # of an upright camera, whose y is down
 _LONGEST, _SHORTEST = 12.0, 0.05  # of clouds of furniture that can be in metres [m]

@@ -8,7 +8,7 @@ copied; sizes are those of sold furniture, roughly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from asset_pipeline.procedural.articulated.carcass import carcass
 from asset_pipeline.procedural.solids import box
 from asset_pipeline.procedural.specimen import specimen_rng
 from manipose_mj.poses import SymmetryGroup
-from manipose_mj.ppf_jax.articulated_subject import ArticulatedSubject, JointLabel
+from manipose_mj.ppf_jax.articulated_subject import ArticulatedSubject
 from manipose_mj.ppf_jax.home_layout import STYLES, HomeStyle, home_layout
 from manipose_mj.ppf_jax.home_parts import HomePart, Side, door, drawer, plain_front, triangles
 from manipose_mj.ppf_jax.rasteriser import Triangles
@@ -198,19 +198,9 @@ def _desk(c: Cabinet, rng: np.random.Generator) -> tuple[list[Shape], np.ndarray
 
 
 def _shifted(part: HomePart, shift: np.ndarray) -> HomePart:
-    joint = part.joint
-    handle = joint.handle.copy()
+    handle = part.joint.handle.copy()
     handle[:3, 3] += shift
-    moved = JointLabel(
-        joint.name,
-        joint.hinge,
-        joint.origin + shift,
-        joint.axis,
-        joint.travel,
-        handle,
-        joint.handle_extents,
-        joint.symmetry,
-    )
+    moved = replace(part.joint, origin=part.joint.origin + shift, handle=handle)
     return HomePart(Triangles(part.surface.corners + shift, part.surface.closed), moved)
 
 
