@@ -44,7 +44,7 @@ __all__ = [
 
 _LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
 # A servo whose set-point stays this far ahead drives its joint, or the TCP, at the limit of its speed.
-_JOINT_LEAD = SERVO_LAG * VELOCITY_LIMITS  # [rad]
+_JOINT_LEADS = SERVO_LAG * np.stack([-VELOCITY_LIMITS, VELOCITY_LIMITS])  # [rad]
 _TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
 # The TCP is never further than this from each joint's axis [m].
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
@@ -186,21 +186,23 @@ class Panda(composer.Entity):
         they follow, as fast as is allowed. Nor do they run away from an arm that is stopped or falls behind:
         it would be flung after them, at several times its limits, as soon as it could move again.
         """
-        ids, data = self._model_ids(physics), physics.data.ptr
-        control, angles = ids.control, ids.joint_angles
-        step = ids.model.opt.timestep * VELOCITY_LIMITS
+        ids = self._model_ids(physics)
+        room, angles = ids.room, ids.joint_angles
+        joints, leads = room.joints, room.leads
         # Within a step's way of where the set-point is, then within the lead of where the joint is.
-        joints = np.minimum(np.maximum(target[:7], control - step), control + step)
-        joints = np.minimum(np.maximum(joints, angles - _JOINT_LEAD), angles + _JOINT_LEAD)
-        leads = joints - angles
-        if np.abs(leads) @ _REACH > _TCP_LEAD:
-            mujoco.mj_jacSite(ids.model, data, ids.jacobian, None, ids.tcp)
-            way = ids.jacobian[:, ids.dofs] @ leads
-            length = math.sqrt(way @ way)
+        np.add(ids.control, room.ways(ids.options.timestep), out=room.window)
+        np.minimum(np.maximum(target[:7], room.low, out=joints), room.high, out=joints)
+        np.add(angles, _JOINT_LEADS, out=room.window)
+        np.minimum(np.maximum(joints, room.low, out=joints), room.high, out=joints)
+        np.subtract(joints, angles, out=leads)
+        if np.abs(leads).dot(_REACH) > _TCP_LEAD:
+            mujoco.mj_jacSite(ids.model, ids.data, ids.jacobian, None, ids.tcp)
+            way = ids.jacobian[:, ids.dofs].dot(leads)
+            length = math.sqrt(way.dot(way))
             if length > _TCP_LEAD:
                 joints = angles + (_TCP_LEAD / length) * leads
-        np.minimum(np.maximum(joints, _LOWEST), _HIGHEST, out=control)
-        data.ctrl[ids.gripper] = min(max(target[7], 0.0), MAX_OPENING)
+        np.minimum(np.maximum(joints, _LOWEST, out=joints), _HIGHEST, out=ids.control)
+        ids.opening[0] = min(max(float(target[7]), 0.0), MAX_OPENING)
 
     def _model_ids(self, physics: mjcf.Physics) -> _Ids:
         """Where the robot is in a compiled model and its data, looked up once for each."""
@@ -209,19 +211,23 @@ class Panda(composer.Entity):
             model = physics.model.ptr
             joints = np.array(physics.bind(self._joints).element_id)
             arm = _run(physics.bind(self._actuators).element_id)
+            gripper = int(physics.bind(self._gripper_actuator).element_id)
             angles = _run(model.jnt_qposadr[joints])
             self._ids = _Ids(
                 model=model,
+                options=model.opt,
                 data=data,
                 arm=arm,
-                gripper=int(physics.bind(self._gripper_actuator).element_id),
+                gripper=gripper,
                 angles=angles,
                 dofs=_run(model.jnt_dofadr[joints]),
                 fingers=_run(np.array(physics.bind(self._finger_joints).qposadr)),
                 tcp=int(physics.bind(self.tcp_site).element_id),
                 control=data.ctrl[arm],
+                opening=data.ctrl[gripper : gripper + 1],
                 joint_angles=data.qpos[angles],
                 jacobian=np.zeros((3, model.nv)),
+                room=_Room(),
             )
         return self._ids
 
@@ -256,11 +262,13 @@ class Panda(composer.Entity):
 class _Ids:
     """Where the robot is in a model and its data.
 
-    Attributes: model; data; arm, gripper, actuators; angles, fingers, in qpos; dofs, in qvel; tcp, the site;
-    control, joint_angles, views of the arm's in `data`; jacobian, room for the site's Jacobian.
+    Attributes: model; options, the model's; data; arm, gripper, actuators; angles, fingers, in qpos; dofs, in
+    qvel; tcp, the site; control, opening, joint_angles, views of the controls and angles in `data`; jacobian,
+    room for the site's Jacobian; room, for all else that `follow_targets` computes.
     """
 
     model: mujoco.MjModel
+    options: mujoco.MjOption
     data: mujoco.MjData
     arm: slice
     gripper: int
@@ -269,8 +277,30 @@ class _Ids:
     fingers: slice
     tcp: int
     control: Float[np.ndarray, "7"]
+    opening: Float[np.ndarray, "1"]
     joint_angles: Float[np.ndarray, "7"]
     jacobian: Float[np.ndarray, "3 nv"]
+    room: _Room
+
+
+class _Room:
+    """What `follow_targets` writes into: it is called so often that new arrays would cost a fifth of its time.
+
+    Attributes: window, the least and the greatest angle of each joint; low, high, its rows; joints; leads.
+    """
+
+    def __init__(self) -> None:
+        self.window = np.empty((2, 7))
+        self.low, self.high = self.window
+        self.joints, self.leads = np.empty(7), np.empty(7)
+        self._timestep, self._ways = 0.0, np.zeros((2, 7))
+
+    def ways(self, timestep: float) -> Float[np.ndarray, "2 7"]:
+        """How far down and up each joint may move in a time step [rad]."""
+        if timestep != self._timestep:
+            self._timestep = timestep
+            self._ways = timestep * np.stack([-VELOCITY_LIMITS, VELOCITY_LIMITS])
+        return self._ways
 
 
 def _run(indices: Int[np.ndarray, "n"]) -> slice:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from dm_control import mjcf
 from jaxtyping import Float, Int
@@ -152,12 +153,14 @@ class SceneReader:
         """Whether the robot touches this object now."""
         return bool(self._touching(physics.data.ptr)[0][self._objects[entity].owner])
 
-    def _touching(self, data: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _touching(self, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Who is touched by the robot, by its left pad and by its right pad; masks over owners."""
-        pairs = self._owners[data.contact.geom]  # pyright: ignore[reportAttributeAccessIssue]
         masks = np.zeros((3, self._count), bool)
+        if not data.ncon:  # as most of the time: none are computed between things asleep
+            return masks[0], masks[1], masks[2]
+        pairs = self._owners[data.contact.geom]
         pairs = pairs[pairs.min(axis=1) <= _RIGHT_PAD]
-        if not len(pairs):  # as most of the time
+        if not len(pairs):
             return masks[0], masks[1], masks[2]
         first, second = pairs[:, 0], pairs[:, 1]
         for one, other in ((first, second), (second, first)):
