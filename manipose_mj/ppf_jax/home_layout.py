@@ -24,6 +24,7 @@ class HomeStyle:
       open: Share of cells that nothing shuts.
       flaps: Share of single doors that turn about a level axis; upwards, of these, about the upper one.
       merge: Share of doors that go on in the row above.
+      single: Clear width up to which one door may shut a cell [m].
       feet: Whether it may have some.
       desk: Whether a table top is over it.
     """
@@ -39,6 +40,7 @@ class HomeStyle:
     flaps: float = 0.0
     upwards: float = 0.5
     merge: float = 0.2
+    single: float = 0.80
     feet: bool = True
     desk: bool = False
 
@@ -65,15 +67,23 @@ _DISHWASHER = HomeStyle(
     flaps=0.85,
     upwards=0.1,
 )
+# Few and wide doors, as toys, models and garages have them.
+_WIDE_DOORS = HomeStyle(
+    *((1, 2), (0.55, 1.05), (1, 2), (0.30, 0.95), (0.30, 0.60)),
+    drawers=0.3,
+    open=0.0,
+    merge=0.4,
+    single=1.05,
+)
 _SHELF = HomeStyle((1, 3), (0.28, 0.70), (3, 6), (0.20, 0.42), depth=(0.25, 0.45), open=0.4)
 STYLES = (
     *(_TALL_DOORS, _DRESSER, _FLAPS, _WARDROBE, _DESK, _SIDEBOARD),
-    *(_FRIDGE, _TALL_DOORS, _SHELF, _DISHWASHER, _WARDROBE),
+    *(_FRIDGE, _TALL_DOORS, _SHELF, _DISHWASHER, _WARDROBE, _WIDE_DOORS, _WIDE_DOORS),
 )
 _MOST = 10  # parts
 _WIDEST, _HIGHEST = 2.2, 2.1  # [m]
 _DRAWER_UP_TO, _TALL = 0.30, 0.40  # clear heights of cells [m]
-_DOUBLE_FROM, _SINGLE_UP_TO = 0.50, 0.80  # clear widths [m]
+_DOUBLE_FROM = 0.50  # clear width [m]
 
 
 def home_layout(style: HomeStyle, rng: np.random.Generator) -> Layout:
@@ -138,7 +148,7 @@ def _cell(
         last += 1
     height = sum(rows[row:last])
     shelves = int(rng.integers(0, 1 + max(1, int(height / 0.35)))) if height > _TALL else 0
-    double = width > _SINGLE_UP_TO or (width > _DOUBLE_FROM and rng.random() < 0.5)
+    double = width > style.single or (width > _DOUBLE_FROM and rng.random() < 0.5)
     if double and rng.random() >= style.flaps:
         return Cell(f"door_{name}", "double door", span, (row, last), shelves=shelves)
     hinge = "left" if rng.random() < 0.5 else "right"

@@ -137,20 +137,41 @@ def test_inside_of_a_box_is_seen_with_normals_inwards():
     np.testing.assert_allclose(image.normal[10, 10], [0, 0, 1], atol=1e-6)
 
 
-@pytest.mark.parametrize("camera", ["far", "near", "down", "sensor"])
-def test_equals_a_ray_at_a_time(clutter, camera):
-    model, data = clutter
+def _checked_picture(model, data, camera):
+    """A picture of 60 by 80 pixels, after comparing each with `mj_ray`."""
     image = RayCamera(60, 80).render(model, data, camera)
     pose = camera_pose(model, data, camera)
     slopes = camera_intrinsics(model, camera, 60, 80).slopes()
     rays = np.concatenate([slopes, np.ones((60, 80, 1))], -1) @ pose[:3, :3].T
     groups, geom = np.array([1, 1, 1, 0, 0, 0], np.uint8), np.zeros(1, np.int32)
+    for v, u in np.ndindex(60, 80):
+        scale = mujoco.mj_ray(model, data, pose[:3, 3], rays[v, u], groups, True, -1, geom)
+        assert geom[0] == image.geom_id[v, u]
+        assert max(scale, 0) == pytest.approx(image.depth[v, u], abs=1e-6)
+    return image
+
+
+@pytest.mark.parametrize("camera", ["far", "near", "down", "sensor"])
+def test_equals_a_ray_at_a_time(clutter, camera):
+    model, data = clutter
+    image = _checked_picture(model, data, camera)
     assert len(np.unique(image.geom_id)) >= 5
-    for v in range(60):
-        for u in range(80):
-            scale = mujoco.mj_ray(model, data, pose[:3, 3], rays[v, u], groups, True, -1, geom)
-            assert geom[0] == image.geom_id[v, u]
-            assert max(scale, 0) == pytest.approx(image.depth[v, u], abs=1e-6)
+
+
+def test_meshes_that_fill_the_picture_hide_each_other_as_by_a_ray_at_a_time():
+    model, data = _ready(
+        """<mujoco><asset><mesh name='block' vertex='-1 -1 -1 1 -1 -1 -1 1 -1 1 1 -1
+             -1 -1 1 1 -1 1 -1 1 1 1 1 1'/><mesh name='wedge' vertex='-1 -1 -1 1 -1 -1 -1 1 -1 1 1 -1 0 0 1'/></asset>
+           <worldbody><camera name='c' pos='0 0 6' euler='9 4 0'/>
+             <geom name='behind' type='mesh' mesh='block' pos='0.2 0 -1.5' euler='10 20 30'/>
+             <body><geom name='first' type='mesh' mesh='wedge' euler='0 0 20'/>
+               <geom name='same' type='mesh' mesh='wedge' euler='0 0 20'/></body>
+             <body pos='0.5 0.4 2'><geom name='before' type='mesh' mesh='block' size='.2 .2 .2' euler='40 0 0'/></body>
+             <geom name='post' type='capsule' size='.1 2' pos='-0.7 0 1'/></worldbody></mujoco>"""
+    )
+    image = _checked_picture(model, data, "c")
+    seen = {model.geom(g).name for g in np.unique(image.geom_id) if g >= 0}
+    assert seen == {"behind", "first", "before", "post"}
 
 
 def test_model_is_left_as_it_was(clutter):

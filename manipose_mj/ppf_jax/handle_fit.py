@@ -1,0 +1,214 @@
+"""Fits handles, and the doors that they are on, to all points of a cloud, after the network's votes.
+
+A network that looks at some 2,048 points knows about where a handle is and what it is on, but neither where a long
+bar ends nor where a wide door does. The cloud shows both: what stands out from the panel goes on along a bar up
+to its ends, and the panel up to the door's edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from manipose_mj.poses import compose
+from manipose_mj.ppf_jax.rotations import from_vector
+
+
+@dataclass(frozen=True)
+class HandleFitConfig:
+    """How points are told to be of a handle, or of its door.
+
+    Attributes:
+      reaches: How far from the voted centre points of the handle are looked for, along it, in turn [m].
+      across: How far from its axis they may be [m].
+      height: From which share of the handle's height above the panel on they are the handle's.
+      gap: Without a point, that does not end a handle [m].
+      turned: Length from which on a handle's points say which way it runs [m].
+      least: Points without which a handle stays where it was voted.
+      strip: Half the width, along the hinge, of what is looked at of a door [m].
+      thick: How far from the door's plane points of it may be [m].
+      door_gap: As `gap`, of a door: a handle's shadow on it is wider [m].
+      begin: Where the door is looked at from, from the handle's centre on [m].
+      inset: Of a hinge, from the door's edge [m].
+      snap: Most that a hinge is moved by [m].
+    """
+
+    reaches: tuple[float, ...] = (0.07, 0.15, 0.45)
+    across: float = 0.015
+    height: float = 0.5
+    gap: float = 0.02
+    turned: float = 0.06
+    least: int = 6
+    strip: float = 0.15
+    thick: float = 0.012
+    door_gap: float = 0.03
+    begin: float = 0.06
+    inset: float = 0.005
+    snap: float = 0.07
+
+
+class Joint(eqx.Module):
+    """A handle and the joint of its part, in any frame.
+
+    Attributes:
+      handle: `(4, 4)`, X along the handle, Y out of the panel.
+      hinge: Probability of turning; else the part slides.
+      origin: `(3,)` [m], on the joint's axis; the handle's centre of a part that slides.
+      axis: `(3,)`, unit.
+    """
+
+    handle: Float[Array, "4 4"]
+    hinge: Float[Array, ""]
+    origin: Float[Array, "3"]
+    axis: Float[Array, "3"]
+
+
+_Y = jnp.array([0.0, 1.0, 0.0])
+_BIN = 0.0025  # [m]
+_PANEL_BIN = 0.002  # [m]
+_HIGHEST, _LOWEST = -0.004, -0.08  # of panels, from the handle's centre [m]
+_AROUND = (
+    0.10,
+    0.08,
+)  # half of the part of a panel that is looked at, along and across the handle [m]
+_USUAL = -0.03  # height of a panel that does not show [m]
+_NOISE = 0.004  # of points across a handle [m]
+_FARTHEST = 1.5  # edge of a door [m]
+_DOOR_LEAST = 2  # points of a door in a bin: fewer are strays
+_ROUNDS = 4  # of reweighting
+_FRONT = 0.03  # how far before its voted centre a handle may still be [m]
+
+
+def fitted(
+    points: Float[Array, "n 3"], mask: Bool[Array, "n"], joint: Joint, config: HandleFitConfig
+) -> Joint:
+    """The handle between its ends and along its points, and the hinge at the edge of its door.
+
+    What the points do not show stays as it was.
+
+    Args:
+      points: The whole cloud [m], in the joint's frame.
+      mask: True for points, false for padding.
+      joint: As voted.
+      config: How points are chosen.
+    """
+    handle, panel = _fitted_handle(points, mask, joint.handle, config)
+    # The part turns with its handle: both were voted in one frame.
+    turn = handle[:3, :3] @ joint.handle[:3, :3].T
+    axis = turn @ joint.axis
+    turns = joint.hinge > 0.5
+    origin = handle[:3, 3] + turn @ (joint.origin - joint.handle[:3, 3])
+    origin = jnp.where(turns, origin, handle[:3, 3])
+    moved = _fitted_hinge(points, mask, handle, panel, origin, axis, config)
+    return Joint(handle, joint.hinge, jnp.where(turns, moved, origin), axis)
+
+
+def _fitted_handle(
+    points: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    handle: Float[Array, "4 4"],
+    config: HandleFitConfig,
+) -> tuple[Float[Array, "4 4"], Float[Array, ""]]:
+    """The handle, and the height of its panel above its centre [m]."""
+    centre, rotation = handle[:3, 3], handle[:3, :3]
+    low = high = jnp.zeros(())
+    panel = jnp.asarray(_USUAL)
+    for reach in config.reaches:
+        own = (points - centre) @ rotation
+        panel = _panel_height(own, mask)
+        on = mask & (jnp.abs(own[:, 2]) < config.across) & (jnp.abs(own[:, 0]) < reach)
+        on &= (own[:, 1] > config.height * panel) & (own[:, 1] < _FRONT)
+        high = _end(own[:, 0], on, _BIN, reach, config.gap)
+        low = -_end(-own[:, 0], on, _BIN, reach, config.gap)
+        on &= (own[:, 0] <= high) & (own[:, 0] >= low)
+        sure = (jnp.sum(on) >= config.least) & (high - low > config.turned)
+        slope = jnp.where(sure, _slope(own[:, 0], own[:, 2], on), 0.0)
+        rotation = rotation @ from_vector(-jnp.arctan(slope) * _Y)
+        high, low = (jnp.where(jnp.sum(on) >= config.least, end, 0.0) for end in (high, low))
+    return compose(rotation, centre + 0.5 * (low + high) * rotation[:, 0]), panel
+
+
+def _fitted_hinge(
+    points: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    handle: Float[Array, "4 4"],
+    panel: Float[Array, ""],
+    origin: Float[Array, "3"],
+    axis: Float[Array, "3"],
+    config: HandleFitConfig,
+) -> Float[Array, "3"]:
+    """A point of the hinge, moved across to the door's edge if that is near."""
+    centre, out = handle[:3, 3], handle[:3, 1]
+    across = jnp.cross(axis, out)
+    across = across / jnp.sqrt(across @ across + 1e-12)
+    voted = (origin - centre) @ across
+    across, voted = across * jnp.where(voted < 0, -1.0, 1.0), jnp.abs(voted)
+    offset = points - centre
+    of_door = mask & (jnp.abs(offset @ out - panel) < config.thick)
+    of_door &= jnp.abs(offset @ axis) < config.strip
+    edge = config.begin + _end(
+        offset @ across - config.begin,
+        of_door,
+        2 * _BIN,
+        _FARTHEST,
+        config.door_gap,
+        least=_DOOR_LEAST,
+    )
+    by = edge - config.inset - voted
+    near = (jnp.abs(by) < config.snap) & (edge > config.begin)
+    return origin + jnp.where(near, by, 0.0) * across
+
+
+def _panel_height(own: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, ""]:
+    """Where most of the points behind a handle are, from its centre outwards [m]."""
+    behind = mask & (jnp.abs(own[:, 0]) < _AROUND[0]) & (jnp.abs(own[:, 2]) < _AROUND[1])
+    behind &= (own[:, 1] < _HIGHEST) & (own[:, 1] > _LOWEST)
+    bins = round((_HIGHEST - _LOWEST) / _PANEL_BIN)
+    index = jnp.floor((own[:, 1] - _LOWEST) / _PANEL_BIN).astype(jnp.int32)
+    counts = jnp.bincount(jnp.clip(index, 0, bins - 1), behind.astype(jnp.float32), length=bins)
+    counts = jnp.convolve(counts, jnp.ones(3), mode="same")
+    height = _LOWEST + (jnp.argmax(counts) + 0.5) * _PANEL_BIN
+    return jnp.where(jnp.sum(behind) < 20, _USUAL, height)
+
+
+def _end(
+    distance: Float[Array, "n"],
+    there: Bool[Array, "n"],
+    width: float,
+    reach: float,
+    gap: float,
+    *,
+    least: int = 1,
+) -> Float[Array, ""]:
+    """How far points go on from 0 without a gap [m]; 0 if there are none."""
+    bins = round(reach / width)
+    index = jnp.floor(distance / width).astype(jnp.int32)
+    there = there & (index >= 0) & (index < bins)
+    counts = jnp.bincount(jnp.clip(index, 0, bins - 1), there.astype(jnp.float32), length=bins)
+    step = jnp.arange(bins)
+    taken = counts >= least
+    last = jax.lax.cummax(jnp.where(taken, step, 0))
+    before = jnp.concatenate([jnp.zeros(1, last.dtype), last[:-1]])
+    beyond = jnp.cumsum(taken & (step - before > round(gap / width))) > 0
+    return width * jnp.max(jnp.where(taken & ~beyond, step + 1, 0)).astype(jnp.float32)
+
+
+def _slope(
+    along: Float[Array, "n"], across: Float[Array, "n"], on: Bool[Array, "n"]
+) -> Float[Array, ""]:
+    """Of the line through points of a handle, strays counted little (Cauchy's weights)."""
+    first = jnp.where(on, 1.0, 0.0)
+
+    def refine(_: int, state: tuple[Array, Array]) -> tuple[Array, Array]:
+        slope, weight = state
+        total = jnp.sum(weight) + 1e-9
+        x = along - weight @ along / total
+        z = across - weight @ across / total
+        slope = weight @ (x * z) / (weight @ x**2 + 1e-9)
+        return slope, first / (1 + ((z - slope * x) / _NOISE) ** 2)
+
+    return jax.lax.fori_loop(0, _ROUNDS, refine, (jnp.zeros(()), first))[0]
