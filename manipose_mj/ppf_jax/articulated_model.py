@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import equinox as eqx
 import jax
@@ -15,6 +15,7 @@ from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
 from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned, candidates, normal_starts
 from manipose_mj.ppf_jax.close_look import CloseLook, close_rows
 from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
+from manipose_mj.ppf_jax.handle_fit import HandleFitConfig, Joint, fitted
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
 from manipose_mj.ppf_jax.part_voting import (
@@ -47,6 +48,7 @@ class ArticulatedConfig:
       voting: How its votes are counted.
       points: Points that it looks at.
       close: How points are chosen where handles seem to be.
+      fit: How handles and doors are fitted to the whole cloud in the end.
     """
 
     body: NetworkConfig = field(default_factory=lambda: NetworkConfig(anchors=32))
@@ -59,6 +61,7 @@ class ArticulatedConfig:
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
     close: CloseLook = field(default_factory=CloseLook)
+    fit: HandleFitConfig = field(default_factory=HandleFitConfig)
 
 
 class PartEstimates(eqx.Module):
@@ -127,7 +130,7 @@ def estimate_parts(
     *,
     key: PRNGKeyArray,
 ) -> PartEstimates:
-    """Find likely frames of the body, vote in each for parts and look closely where handles seem to be.
+    """Find likely frames of the body, vote in each for parts, look closely where handles seem to be, and fit.
 
     A pure function of one cloud: `vmap` it.
 
@@ -159,7 +162,7 @@ def estimate_parts(
 
     again, found = jax.lax.map(closer, frames[which])
     best = jnp.argmax(likely + again)
-    return jax.tree.map(lambda leaf: leaf[best], found)
+    return _fitted(jax.tree.map(lambda leaf: leaf[best], found), points, mask, config.fit)
 
 
 def look_closely(
@@ -182,30 +185,39 @@ def look_closely(
       few: Points, normals and mask of the first look.
       neighbours: Of these, as the network looks at them.
       rotation: The frame.
-      key: Draws the points of the close looks.
+      key: Draws the points of the close look.
     """
     config = model.config
     cloud, centre = body_cloud(*few, rotation)
     votes = model.parts(cloud, neighbours)
     parts = find_parts(cloud, votes, config.voting)
-    turn = from_vector(frame_turn(cloud, votes, config.voting))
-    for look in range(config.close.looks):
-        chosen = close_rows(
-            points,
-            mask,
-            parts.centre @ rotation.T + centre,
-            parts.rotation[:, :, 1] @ rotation.T,
-            parts.score > _LIKELY * jnp.max(parts.score),
-            config.points,
-            config.close,
-            key=jax.random.fold_in(key, look),
-        )
-        rotation = rotation @ turn
-        turn = jnp.eye(3)  # once is enough
-        cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
-        votes = model.parts(cloud)
-        parts = find_parts(cloud, votes, config.voting)
+    chosen = close_rows(
+        points,
+        mask,
+        parts.centre @ rotation.T + centre,
+        parts.rotation[:, :, 1] @ rotation.T,
+        parts.score > _LIKELY * jnp.max(parts.score),
+        config.points,
+        config.close,
+        key=key,
+    )
+    rotation = rotation @ from_vector(frame_turn(cloud, votes, config.voting))
+    cloud, centre = body_cloud(points[chosen], normals[chosen], mask[chosen], rotation)
+    votes = model.parts(cloud)
+    parts = find_parts(cloud, votes, config.voting)
     return votes.frame, _in_camera(parts, rotation, centre, up, model.calibration)
+
+
+def _fitted(
+    found: PartEstimates,
+    points: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    config: HandleFitConfig,
+) -> PartEstimates:
+    joints = Joint(found.handle, found.hinge, found.axis_origin, found.axis)
+    up = found.body[:, 1]
+    joints = jax.vmap(lambda joint: fitted(points, mask, joint, up, config))(joints)
+    return replace(found, handle=joints.handle, axis_origin=joints.origin, axis=joints.axis)
 
 
 def body_rotations(

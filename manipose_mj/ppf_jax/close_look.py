@@ -23,14 +23,12 @@ class CloseLook:
       radius: How near to a supposed handle's centre its points are [m].
       out: How far above such a centre, along the handle's Y, points stand out [m]; panels are lower.
       share: Of the points that are from there, at most.
-      looks: How many close looks there are, each where the last one took handles to be.
       frames: In how many frames of the body, the likeliest: only then the best is chosen.
     """
 
     radius: float = 0.09
     out: float = -0.010
     share: float = 0.5
-    looks: int = 1
     frames: int = 3
 
 

@@ -34,7 +34,8 @@ class HandleFitConfig:
       door_gap: As `gap`, of a door: a handle's shadow on it is wider [m].
       begin: Where the door is looked at from, from the handle's centre on [m].
       inset: Of a hinge, from the door's edge [m].
-      snap: Most that a hinge is moved by [m].
+      snap: Most that an upright hinge is moved by [m].
+      snap_level: Most that a level one is: below a flap a plinth often goes on in its plane.
     """
 
     reaches: tuple[float, ...] = (0.07, 0.15, 0.45)
@@ -48,7 +49,8 @@ class HandleFitConfig:
     door_gap: float = 0.03
     begin: float = 0.06
     inset: float = 0.005
-    snap: float = 0.07
+    snap: float = 0.10
+    snap_level: float = 0.02
 
 
 class Joint(eqx.Module):
@@ -80,11 +82,16 @@ _NOISE = 0.004  # of points across a handle [m]
 _FARTHEST = 1.5  # edge of a door [m]
 _DOOR_LEAST = 2  # points of a door in a bin: fewer are strays
 _ROUNDS = 4  # of reweighting
+_UPRIGHT = 0.7  # cosine between upright hinges and the vertical, at least
 _FRONT = 0.03  # how far before its voted centre a handle may still be [m]
 
 
 def fitted(
-    points: Float[Array, "n 3"], mask: Bool[Array, "n"], joint: Joint, config: HandleFitConfig
+    points: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    joint: Joint,
+    up: Float[Array, "3"],
+    config: HandleFitConfig,
 ) -> Joint:
     """The handle between its ends and along its points, and the hinge at the edge of its door.
 
@@ -94,6 +101,7 @@ def fitted(
       points: The whole cloud [m], in the joint's frame.
       mask: True for points, false for padding.
       joint: As voted.
+      up: Unit, either way.
       config: How points are chosen.
     """
     handle, panel = _fitted_handle(points, mask, joint.handle, config)
@@ -103,7 +111,8 @@ def fitted(
     turns = joint.hinge > 0.5
     origin = handle[:3, 3] + turn @ (joint.origin - joint.handle[:3, 3])
     origin = jnp.where(turns, origin, handle[:3, 3])
-    moved = _fitted_hinge(points, mask, handle, panel, origin, axis, config)
+    most = jnp.where(jnp.abs(axis @ up) > _UPRIGHT, config.snap, config.snap_level)
+    moved = _fitted_hinge(points, mask, handle, panel, origin, axis, most, config)
     return Joint(handle, joint.hinge, jnp.where(turns, moved, origin), axis)
 
 
@@ -139,9 +148,10 @@ def _fitted_hinge(
     panel: Float[Array, ""],
     origin: Float[Array, "3"],
     axis: Float[Array, "3"],
+    most: Float[Array, ""],
     config: HandleFitConfig,
 ) -> Float[Array, "3"]:
-    """A point of the hinge, moved across to the door's edge if that is near."""
+    """A point of the hinge, moved across to the door's edge if that is no more than `most` [m] away."""
     centre, out = handle[:3, 3], handle[:3, 1]
     across = jnp.cross(axis, out)
     across = across / jnp.sqrt(across @ across + 1e-12)
@@ -159,7 +169,7 @@ def _fitted_hinge(
         least=_DOOR_LEAST,
     )
     by = edge - config.inset - voted
-    near = (jnp.abs(by) < config.snap) & (edge > config.begin)
+    near = (jnp.abs(by) < most) & (edge > config.begin)
     return origin + jnp.where(near, by, 0.0) * across
 
 

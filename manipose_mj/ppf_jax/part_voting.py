@@ -13,7 +13,6 @@ from jaxtyping import Array, Bool, Float
 from manipose_mj.ppf_jax.part_network import LENGTH, SLIDE_LENGTH, TURN, BodyCloud, PointVotes
 
 EVIDENCE = 4
-_OUTERMOST = 0.02  # share of the points on a handle that may be strays, at each end
 _NOWHERE = 1e3  # [m], where no point votes for
 _PANEL = 0.05  # weight of points that are not on a handle where centres are looked for
 
@@ -32,8 +31,6 @@ class PartVotingConfig:
       reach: How far from a part's centre a point may vote to take part in the part's estimate [m].
       snap: Directions that are this near to an axis of the body, or of the joint, are along it [rad].
       panel: Weight of votes for a handle's centre from points that are not on one.
-      ends: Points on a handle from which on its middle is looked for between its ends.
-      short: Length of a handle up to which it is [m].
       rounds: Of reweighting.
     """
 
@@ -46,8 +43,6 @@ class PartVotingConfig:
     reach: float = 0.06
     snap: float = float(np.radians(20.0))
     panel: float = 0.01
-    ends: int = 6
-    short: float = 0.12
     rounds: int = 6
 
 
@@ -197,7 +192,6 @@ def _part(
     x = settled(votes.values["x"], scale_of("x"))
     x = unit(x - (x @ y) * y)
     rotation = jnp.stack([x, y, jnp.cross(x, y)], axis=-1)
-    centre = _between_ends(cloud, votes, member, centre, x, config)
     feet = cloud.points + LENGTH * votes.values["line"]
     feet = feet - (feet @ axis)[:, None] * axis
     line = settled(feet, LENGTH * scale_of("line"))
@@ -212,27 +206,6 @@ def _part(
     spread = jnp.sqrt(certainty @ off**2 / (jnp.sum(certainty) + 1e-9) + 1e-12)
     handle = member @ jax.nn.softmax(votes.logits)[:, 2]
     return rotation, centre, hinge, axis, line, opening, spread, handle
-
-
-def _between_ends(
-    cloud: BodyCloud,
-    votes: PointVotes,
-    member: Bool[Array, "n"],
-    centre: Float[Array, "3"],
-    x: Float[Array, "3"],
-    config: PartVotingConfig,
-) -> Float[Array, "3"]:
-    """The centre, moved along a short handle to the middle of what is seen of it, where that is enough.
-
-    Votes know how far away the panel is and which way it looks, but take a knob for one end of a bar. Of a
-    long bar the points far from the middle are too few to tell where it ends.
-    """
-    on = member & (jax.nn.softmax(votes.logits)[:, 2] > 0.5)
-    along = jnp.where(on, (cloud.points - centre) @ x, jnp.nan)
-    low, high = jnp.nanquantile(along, jnp.array([_OUTERMOST, 1 - _OUTERMOST]))
-    whole = (jnp.sum(on) >= config.ends) & (high - low < config.short)
-    middle = jnp.where(whole, 0.5 * (low + high), 0.0)
-    return centre + middle * x
 
 
 def _snapped(axis: Float[Array, "3"], within: float) -> Float[Array, "3"]:

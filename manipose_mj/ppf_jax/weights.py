@@ -22,6 +22,7 @@ from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, Articulated
 from manipose_mj.ppf_jax.close_look import CloseLook
 from manipose_mj.ppf_jax.cppf import CppfModel
 from manipose_mj.ppf_jax.cppf_voting import CppfConfig
+from manipose_mj.ppf_jax.handle_fit import HandleFitConfig
 from manipose_mj.ppf_jax.model import EstimatingModel, ModelConfig, PoseModel
 from manipose_mj.ppf_jax.network import NetworkConfig
 from manipose_mj.ppf_jax.part_network import PartNetworkConfig
@@ -155,12 +156,17 @@ def _articulated_config(stored: dict[str, Any]) -> ArticulatedConfig:
         "body": NetworkConfig(**stored["body"]),
         "body_voting": VotingConfig(**stored["body_voting"]),
         "network": PartNetworkConfig(**_tuples(stored["network"])),
-        "voting": PartVotingConfig(**stored["voting"]),
-        "close": CloseLook(**stored.get("close", {})),
+        "voting": PartVotingConfig(**_known(PartVotingConfig, stored["voting"])),
+        "close": CloseLook(**_known(CloseLook, stored.get("close", {}))),
+        "fit": HandleFitConfig(**_known(HandleFitConfig, stored.get("fit", {}))),
     }
-    # Older files have the radius of another kind of second look.
-    stored = {name: value for name, value in stored.items() if name != "focus"}
-    return ArticulatedConfig(**_tuples(stored | own))
+    return ArticulatedConfig(**(_known(ArticulatedConfig, stored) | own))
+
+
+def _known(kind: type, stored: dict[str, Any]) -> dict[str, Any]:
+    """What a dataclass still has: older files say more."""
+    fields = {field.name for field in dataclasses.fields(kind)}
+    return _tuples({name: value for name, value in stored.items() if name in fields})
 
 
 def _tuples(stored: dict[str, Any]) -> dict[str, Any]:

@@ -81,6 +81,7 @@ def test_furniture_s_reproduce_published_shares():
     found = evaluated(estimator, scene_clouds(scenes, fused=3))
     figures = part_summary(found.errors, found.strange, found.clouds)
     assert figures["n"] == 32
-    # As tests compile, without optimisation: 20 and 29 of 32; else 21 and 27. One or two are at the edge of a bar.
-    assert figures["all_right"] == pytest.approx(0.66, abs=0.07)
+    # One of 32 parts may be at the edge of a bar: tests compile without optimisation.
+    assert figures["all_right"] == pytest.approx(0.906, abs=0.04)
     assert figures["joint_right"] == pytest.approx(0.906, abs=0.04)
+    assert figures["strange_per_cloud"] < 0.2
