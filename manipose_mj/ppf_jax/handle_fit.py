@@ -69,14 +69,11 @@ class Joint(eqx.Module):
     axis: Float[Array, "3"]
 
 
-_Y = jnp.array([0.0, 1.0, 0.0])
 _BIN = 0.0025  # [m]
 _PANEL_BIN = 0.002  # [m]
 _HIGHEST, _LOWEST = -0.004, -0.08  # of panels, from the handle's centre [m]
-_AROUND = (
-    0.10,
-    0.08,
-)  # half of the part of a panel that is looked at, along and across the handle [m]
+# Half of the part of a panel that is looked at, along and across the handle [m].
+_AROUND = (0.10, 0.08)
 _USUAL = -0.03  # height of a panel that does not show [m]
 _NOISE = 0.004  # of points across a handle [m]
 _FARTHEST = 1.5  # edge of a door [m]
@@ -136,7 +133,7 @@ def _fitted_handle(
         on &= (own[:, 0] <= high) & (own[:, 0] >= low)
         sure = (jnp.sum(on) >= config.least) & (high - low > config.turned)
         slope = jnp.where(sure, _slope(own[:, 0], own[:, 2], on), 0.0)
-        rotation = rotation @ from_vector(-jnp.arctan(slope) * _Y)
+        rotation = rotation @ from_vector(jnp.array([0.0, -1.0, 0.0]) * jnp.arctan(slope))
         high, low = (jnp.where(jnp.sum(on) >= config.least, end, 0.0) for end in (high, low))
     return compose(rotation, centre + 0.5 * (low + high) * rotation[:, 0]), panel
 

@@ -92,6 +92,21 @@ def test_a_level_hinge_moves_less_for_what_goes_on_may_be_a_plinth():
         assert _across(_fit(points, joint, sideways)) == pytest.approx(level, abs=0.008)
 
 
+@pytest.mark.parametrize("share", [0.3, 0.1, 0.03])
+def test_a_thin_cloud_takes_no_handle_away_from_where_it_was_voted(share):
+    rng = np.random.default_rng(5)
+    points = _door(0.25, rng)
+    points = points[rng.random(len(points)) < share]
+    away = [
+        np.linalg.norm(
+            _fit(points, _voted([along, 0.0, 0.0], 0.0, 0.365)).handle[:3, 3] - _POSE[:3, 3]
+        )
+        for along in (-0.05, 0.0, 0.05)
+    ]
+    assert max(away) < 0.055
+    assert away[1] < 0.02
+
+
 def test_what_no_point_shows_stays():
     joint = _voted([0.02, 0.0, 0.0], 0.1, 0.36)
     found = _fit(np.full((600, 3), 5.0), joint)
