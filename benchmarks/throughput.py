@@ -2,7 +2,7 @@
 
 python benchmarks/throughput.py [--only TASK ...] [--episodes N]
 
-All in one run: compare ratios. Others are measured where they are installed: dm_control's
+All in one run: compare ratios. Others are measured where they are installed and run: dm_control's
 `stack_2_bricks_features` (always), Gymnasium-Robotics' FetchPickAndPlace, robosuite's Lift. Every
 environment is stepped with state observations under small random actions, ten control steps at a time in
 turn with the others, so that a busy machine slows all alike; the median is reported.
@@ -115,35 +115,44 @@ def _reference() -> Runner:
 
 
 def _others() -> list[Runner]:
+    """Other packages' tasks; a line about each that is installed but does not run beside this MuJoCo."""
     found = []
-    if importlib.util.find_spec("gymnasium_robotics"):
-        import gymnasium
-        import gymnasium_robotics
-
-        gymnasium.register_envs(gymnasium_robotics)
-        fetch = gymnasium.make("FetchPickAndPlace-v4")
-        step = functools.partial(_gym_step, fetch)
-        substeps = fetch.unwrapped.n_substeps
-        found.append(Runner("Gymnasium-Robotics FetchPickAndPlace", step, substeps, fetch.reset))
-    if importlib.util.find_spec("robosuite"):
-        import robosuite
-
-        lift = robosuite.make(
-            "Lift", robots="Panda", has_renderer=False, use_camera_obs=False,
-            has_offscreen_renderer=False,
-        )  # fmt: skip
-        low, high = lift.action_spec
-        rng = np.random.default_rng(0)
-        substeps = round(lift.control_timestep / lift.model_timestep)
-        found.append(
-            Runner(
-                "robosuite Lift",
-                lambda: lift.step(rng.uniform(0.2 * low, 0.2 * high)),
-                substeps,
-                lift.reset,
-            )
-        )
+    for package, build in (("gymnasium_robotics", _fetch), ("robosuite", _lift)):
+        if importlib.util.find_spec(package) is None:
+            continue
+        try:
+            found.append(build())
+        except Exception as error:  # whatever another package raises
+            print(f"{package}: left out ({type(error).__name__}: {str(error) or 'no message'})")
     return found
+
+
+def _fetch() -> Runner:
+    import gymnasium
+    import gymnasium_robotics
+
+    gymnasium.register_envs(gymnasium_robotics)
+    fetch = gymnasium.make("FetchPickAndPlace-v4")
+    step = functools.partial(_gym_step, fetch)
+    substeps = fetch.unwrapped.n_substeps
+    return Runner("Gymnasium-Robotics FetchPickAndPlace", step, substeps, fetch.reset)
+
+
+def _lift() -> Runner:
+    import robosuite
+
+    lift = robosuite.make(
+        "Lift", robots="Panda", has_renderer=False, use_camera_obs=False,
+        has_offscreen_renderer=False,
+    )  # fmt: skip
+    low, high = lift.action_spec
+    rng = np.random.default_rng(0)
+
+    def step() -> None:
+        lift.step(rng.uniform(0.2 * low, 0.2 * high))
+
+    substeps = round(lift.control_timestep / lift.model_timestep)
+    return Runner("robosuite Lift", step, substeps, lift.reset)
 
 
 def _gym_step(environment) -> None:
