@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from manipose_mj.poses import compose
+from manipose_mj.ppf_jax.part_voting import unit
 from manipose_mj.ppf_jax.rotations import from_vector
 
 
@@ -150,8 +151,7 @@ def _fitted_hinge(
 ) -> Float[Array, "3"]:
     """A point of the hinge, moved across to the door's edge if that is no more than `most` [m] away."""
     centre, out = handle[:3, 3], handle[:3, 1]
-    across = jnp.cross(axis, out)
-    across = across / jnp.sqrt(across @ across + 1e-12)
+    across = unit(jnp.cross(axis, out))
     voted = (origin - centre) @ across
     across, voted = across * jnp.where(voted < 0, -1.0, 1.0), jnp.abs(voted)
     offset = points - centre

@@ -67,7 +67,7 @@ _DISHWASHER = HomeStyle(
     flaps=0.85,
     upwards=0.1,
 )
-# Few and wide doors, as toys, models and garages have them.
+# Few and wide doors: models of furniture are often of no true size.
 _WIDE_DOORS = HomeStyle(
     *((1, 2), (0.55, 1.05), (1, 2), (0.30, 0.95), (0.30, 0.60)),
     drawers=0.3,
