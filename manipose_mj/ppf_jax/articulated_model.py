@@ -15,6 +15,7 @@ from manipose_mj.ppf_jax.articulated_clouds import BATCH_POINTS
 from manipose_mj.ppf_jax.body_frame import BODY_SYMMETRY, aligned, candidates, normal_starts
 from manipose_mj.ppf_jax.close_look import CloseLook, close_rows
 from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled
+from manipose_mj.ppf_jax.front_edges import FrontEdgesConfig, turned_by_edges
 from manipose_mj.ppf_jax.handle_fit import HandleFitConfig, Joint, fitted
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.part_network import BodyCloud, PartNetwork, PartNetworkConfig
@@ -44,6 +45,7 @@ class ArticulatedConfig:
       body_pairs: Votes at inference.
       normal_starts: Frames along normals that are tried besides those that pairs vote for.
       apart: From which angle on two frames' axes are not the same [rad].
+      edges: How a turn about the front is told by edges.
       network: Sizes of the part network.
       voting: How its votes are counted.
       points: Points that it looks at.
@@ -57,6 +59,7 @@ class ArticulatedConfig:
     body_pairs: int = 4096
     normal_starts: int = 8
     apart: float = float(np.radians(6.0))
+    edges: FrontEdgesConfig = field(default_factory=FrontEdgesConfig)
     network: PartNetworkConfig = field(default_factory=PartNetworkConfig)
     voting: PartVotingConfig = field(default_factory=PartVotingConfig)
     points: int = BATCH_POINTS
@@ -146,10 +149,13 @@ def estimate_parts(
     config = model.config
     body_key, first_key, second_key = jax.random.split(key, 3)
     order = jax.random.uniform(first_key, mask.shape) + 2.0 * ~mask
-    chosen = jax.lax.top_k(-order, config.points)[1]
+    chosen = jax.lax.top_k(-order, min(config.edges.points, len(mask)))[1]
+    several = points[chosen], normals[chosen], mask[chosen]
+    chosen = chosen[: config.points]
     few = points[chosen], normals[chosen], mask[chosen]
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
     settled = body_rotations(model, *few, key=body_key)
+    settled = settled.at[0].set(turned_by_edges(settled[0], *several, config.edges))
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
     logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)

@@ -35,8 +35,10 @@ class HandleFitConfig:
       door_gap: As `gap`, of a door: a handle's shadow on it is wider [m].
       begin: Where the door is looked at from, from the handle's centre on [m].
       inset: Of a hinge, from the door's edge [m].
-      snap: Most that an upright hinge is moved by [m].
+      snap: Most that an upright hinge is moved by, of doors whose plane has gaps or is cut off [m].
       snap_level: Most that a level one is: below a flap a plinth often goes on in its plane.
+      notch: Share of the points around it with which a strip of the door's plane is taken for a gap
+        between two doors. Where there is none up to the plane's end, the hinge is not before it.
     """
 
     reaches: tuple[float, ...] = (0.07, 0.15, 0.45)
@@ -52,6 +54,7 @@ class HandleFitConfig:
     inset: float = 0.005
     snap: float = 0.10
     snap_level: float = 0.02
+    notch: float = 0.6
 
 
 class Joint(eqx.Module):
@@ -80,6 +83,8 @@ _NOISE = 0.004  # of points across a handle [m]
 _FARTHEST = 1.5  # edge of a door [m]
 _DOOR_LEAST = 2  # points of a door in a bin: fewer are strays
 _ROUNDS = 4  # of reweighting
+_AROUND_NOTCH = 8  # bins to either side that a gap is told by
+_NOTCH_LEAST = 6.0  # points in a bin, on average, for a gap to be told
 _UPRIGHT = 0.7  # cosine between upright hinges and the vertical, at least
 _FRONT = 0.03  # how far before its voted centre a handle may still be [m]
 
@@ -129,8 +134,8 @@ def _fitted_handle(
         panel = _panel_height(own, mask)
         on = mask & (jnp.abs(own[:, 2]) < config.across) & (jnp.abs(own[:, 0]) < reach)
         on &= (own[:, 1] > config.height * panel) & (own[:, 1] < _FRONT)
-        high = _end(own[:, 0], on, _BIN, reach, config.gap)
-        low = -_end(-own[:, 0], on, _BIN, reach, config.gap)
+        high = _end(_counts(own[:, 0], on, _BIN, reach), _BIN, config.gap)
+        low = -_end(_counts(-own[:, 0], on, _BIN, reach), _BIN, config.gap)
         on &= (own[:, 0] <= high) & (own[:, 0] >= low)
         sure = (jnp.sum(on) >= config.least) & (high - low > config.turned)
         slope = jnp.where(sure, _slope(own[:, 0], own[:, 2], on), 0.0)
@@ -157,17 +162,13 @@ def _fitted_hinge(
     offset = points - centre
     of_door = mask & (jnp.abs(offset @ out - panel) < config.thick)
     of_door &= jnp.abs(offset @ axis) < config.strip
-    edge = config.begin + _end(
-        offset @ across - config.begin,
-        of_door,
-        2 * _BIN,
-        _FARTHEST,
-        config.door_gap,
-        least=_DOOR_LEAST,
-    )
-    by = edge - config.inset - voted
-    near = (jnp.abs(by) < most) & (edge > config.begin)
-    return origin + jnp.where(near, by, 0.0) * across
+    counts = _counts(offset @ across - config.begin, of_door, 2 * _BIN, _FARTHEST)
+    reach = _end(counts, 2 * _BIN, config.door_gap, least=_DOOR_LEAST)
+    by = config.begin + reach - config.inset - voted
+    plain = ~_has_notch(counts, reach, 2 * _BIN, config.notch)
+    # Beyond its end the door may go on unseen; before it, it does not end without a gap.
+    near = (jnp.abs(by) < most) | (plain & (by > 0))
+    return origin + jnp.where(near & (reach > 0), by, 0.0) * across
 
 
 def _panel_height(own: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, ""]:
@@ -182,26 +183,44 @@ def _panel_height(own: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Arr
     return jnp.where(jnp.sum(behind) < 20, _USUAL, height)
 
 
-def _end(
-    distance: Float[Array, "n"],
-    there: Bool[Array, "n"],
-    width: float,
-    reach: float,
-    gap: float,
-    *,
-    least: int = 1,
-) -> Float[Array, ""]:
-    """How far points go on from 0 without a gap [m]; 0 if there are none."""
+def _counts(
+    distance: Float[Array, "n"], there: Bool[Array, "n"], width: float, reach: float
+) -> Float[Array, "bins"]:
+    """Points in bins of a width from 0 on [m]."""
     bins = round(reach / width)
     index = jnp.floor(distance / width).astype(jnp.int32)
     there = there & (index >= 0) & (index < bins)
-    counts = jnp.bincount(jnp.clip(index, 0, bins - 1), there.astype(jnp.float32), length=bins)
-    step = jnp.arange(bins)
+    return jnp.bincount(jnp.clip(index, 0, bins - 1), there.astype(jnp.float32), length=bins)
+
+
+def _end(
+    counts: Float[Array, "bins"], width: float, gap: float, *, least: int = 1
+) -> Float[Array, ""]:
+    """How far points go on from 0 without a gap [m]; 0 if there are none."""
+    step = jnp.arange(len(counts))
     taken = counts >= least
     last = jax.lax.cummax(jnp.where(taken, step, 0))
     before = jnp.concatenate([jnp.zeros(1, last.dtype), last[:-1]])
     beyond = jnp.cumsum(taken & (step - before > round(gap / width))) > 0
     return width * jnp.max(jnp.where(taken & ~beyond, step + 1, 0)).astype(jnp.float32)
+
+
+def _has_notch(
+    counts: Float[Array, "bins"], reach: Float[Array, ""], width: float, share: float
+) -> Bool[Array, ""]:
+    """Whether a bin before the end has fewer points than this share of the mean around it.
+
+    Also where there are too few points to tell.
+    """
+    step = jnp.arange(len(counts))
+    inside = step < jnp.round(reach / width)
+    others = jnp.ones(2 * _AROUND_NOTCH + 1).at[_AROUND_NOTCH].set(0.0)
+    known = jnp.convolve(inside.astype(jnp.float32), others, mode="same")
+    mean = jnp.convolve(jnp.where(inside, counts, 0.0), others, mode="same")
+    mean = mean / jnp.maximum(known, 1.0)
+    looked_at = inside & (step >= 2) & (step < jnp.round(reach / width) - 3)
+    few = (counts < share * mean) | (mean < _NOTCH_LEAST)
+    return jnp.any(looked_at & few)
 
 
 def _slope(

@@ -14,22 +14,26 @@ from manipose_mj.ppf_jax.handle_fit import HandleFitConfig, Joint, fitted
 _POSE = compose(rotation_about(np.array([0.6, 0.0, 0.8]), 0.7), np.array([0.1, -0.2, 1.1]))
 _HEIGHT = 0.035  # of the handle's centre above the door [m]
 _HINGE = 0.38  # across from the handle [m]
+_ROWS = 16_384
 _UP = jnp.asarray(_POSE[:3, 0], jnp.float32)
-_FIT = jax.jit(
-    lambda points, mask, joint, up=_UP: fitted(points, mask, joint, up, HandleFitConfig())
-)
+_FIT = jax.jit(lambda points, mask, joint, up: fitted(points, mask, joint, up, HandleFitConfig()))
 
 
 def _grid(x, y, z):
     return np.stack(np.meshgrid(x, y, z), axis=-1).reshape(-1, 3)
 
 
-def _door(length, rng):
-    """A cloud of a door, and of a bar of this length on it; the camera's frame [m]."""
+def _door(length, rng, gap=None):
+    """A cloud of a door, and of a bar of this length on it; the camera's frame [m].
+
+    With a gap somewhere across, what lies beyond is another door's.
+    """
     panel = _grid(
         np.arange(-0.25, 0.25, 0.004), [-_HEIGHT], np.arange(-0.06, _HINGE + 0.005, 0.004)
     )
     bar = _grid(np.arange(-length / 2, length / 2, 0.003), [0.005], np.arange(-0.005, 0.006, 0.003))
+    if gap is not None:
+        panel = panel[np.abs(panel[:, 2] - gap) > 0.006]
     # The bar hides what is behind it from a camera straight before it.
     hidden = (np.abs(panel[:, 0]) < length / 2) & (np.abs(panel[:, 2]) < 0.006)
     points = np.concatenate([panel[~hidden], bar])
@@ -46,9 +50,15 @@ def _voted(offset, turn, hinge_at, hinge=0.97):
     return Joint(*(jnp.asarray(value, jnp.float32) for value in values))
 
 
-def _fit(points, joint, up=_UP, padding=500):
-    rows = np.concatenate([points, np.zeros((padding, 3))]).astype(np.float32)
-    found = _FIT(rows, np.arange(len(rows)) < len(points), joint, up)
+def _padded(points):
+    """Of one size, which compiles once; and what is a point."""
+    rows = np.zeros((_ROWS, 3), np.float32)
+    rows[: len(points)] = points
+    return rows, np.arange(_ROWS) < len(points)
+
+
+def _fit(points, joint, up=_UP):
+    found = _FIT(*_padded(points), joint, up)
     return jax.tree.map(lambda leaf: np.asarray(leaf, float), found)
 
 
@@ -78,14 +88,26 @@ def test_a_knob_says_nothing_of_directions():
     )
 
 
-def test_a_hinge_that_was_voted_far_from_any_edge_stays():
+def test_a_plain_door_ends_where_its_plane_does_and_not_before():
     points = _door(0.2, np.random.default_rng(2))
-    found = _fit(points, _voted([0.0, 0.0, 0.0], 0.0, 0.25))
-    assert _across(found) == pytest.approx(0.25, abs=0.005)
+    sideways = jnp.asarray(_POSE[:3, 2], jnp.float32)
+    for up in (_UP, sideways):
+        found = _fit(points, _voted([0.0, 0.0, 0.0], 0.0, 0.15), up)
+        assert _across(found) == pytest.approx(_HINGE, abs=0.008)
+        # It may go on where nothing shows it.
+        found = _fit(points, _voted([0.0, 0.0, 0.0], 0.0, 0.55), up)
+        assert _across(found) == pytest.approx(0.55, abs=0.005)
+
+
+def test_a_hinge_that_was_voted_far_from_any_edge_stays_where_there_is_a_gap():
+    points = _door(0.2, np.random.default_rng(2), gap=0.2)
+    found = _fit(points, _voted([0.0, 0.0, 0.0], 0.0, 0.15))
+    assert _across(found) == pytest.approx(0.15, abs=0.005)
 
 
 def test_a_level_hinge_moves_less_for_what_goes_on_may_be_a_plinth():
-    points, sideways = _door(0.2, np.random.default_rng(2)), jnp.asarray(_POSE[:3, 2], jnp.float32)
+    points = _door(0.2, np.random.default_rng(2), gap=0.32)
+    sideways = jnp.asarray(_POSE[:3, 2], jnp.float32)
     for voted, upright, level in ((0.33, _HINGE, 0.33), (0.368, _HINGE, _HINGE)):
         joint = _voted([0.0, 0.0, 0.0], 0.0, voted)
         assert _across(_fit(points, joint)) == pytest.approx(upright, abs=0.008)
@@ -122,11 +144,12 @@ def test_a_slide_s_axis_goes_through_the_handle():
 
 
 def test_many_parts_at_once_are_as_one_by_one():
-    points = _door(0.25, np.random.default_rng(4)).astype(np.float32)
+    points, mask = _padded(_door(0.25, np.random.default_rng(4)))
     joints = [_voted([along, 0.0, 0.0], 0.05, 0.36) for along in (-0.06, 0.0, 0.06)]
-    mask = np.ones(len(points), bool)
-    together = jax.vmap(lambda joint: _FIT(points, mask, joint))(
+    together = jax.vmap(lambda joint: _FIT(points, mask, joint, _UP))(
         jax.tree.map(lambda *rows: jnp.stack(rows), *joints)
     )
     for i, joint in enumerate(joints):
-        np.testing.assert_allclose(together.handle[i], _FIT(points, mask, joint).handle, atol=1e-5)
+        np.testing.assert_allclose(
+            together.handle[i], _FIT(points, mask, joint, _UP).handle, atol=1e-5
+        )
