@@ -25,7 +25,7 @@ def train_pose(
     leave_out: Annotated[tuple[str, ...], arg(metavar="CATEGORY...")] = (),
     method: Literal["ours", "cppf"] = "ours",
     labels: Literal["unified", "original"] = "unified",
-    setting: str = "training",
+    setting: Annotated[tuple[str, ...], arg(metavar="NAME...")] = ("training",),
     views: int = 256,
     batch: int = 64,
     steps: int = 20_000,
@@ -48,8 +48,8 @@ def train_pose(
       method: Our estimator, or CPPF as published, to compare with; for the latter --batch 8 is enough
         on a CPU.
       labels: The unified labels, or those of the sources that the objects are assigned to.
-      setting: From where objects are seen: training, anywhere, resting, tasks, clean, occluded.
-      views: Of each object.
+      setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
+      views: Of each object in each setting.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -68,7 +68,7 @@ def train_pose(
     from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
-    clouds = source.rendered("train", setting, views)
+    clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)

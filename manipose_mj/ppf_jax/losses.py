@@ -41,7 +41,7 @@ class LossConfig:
     """How many frames of each kind the refiner is shown of a cloud, and how far these are off.
 
     Attributes:
-      stretch: Logarithm of the largest factor by which an object is stretched along an axis.
+      stretch: Logarithm of the largest factor by which an object is stretched along an axis (`stretched`).
       outliers: The largest share of a spoilt cloud's points that are anywhere around the object.
       pairs: Votes of a cloud.
       noised: The true frame, turned and shifted a little, evenly in the logarithm of how much.
@@ -53,7 +53,7 @@ class LossConfig:
       shift: Least and most, in the cloud's units.
     """
 
-    stretch: float = 0.2
+    stretch: float = 0.35
     outliers: float = 0.25
     pairs: int = 1000
     noised: int = 3

@@ -25,9 +25,12 @@ def stretched(sample: CloudBatch, most: float, *, key: PRNGKeyArray) -> CloudBat
 
     Args:
       sample: A `CloudBatch` without its first axis.
-      most: Logarithm of the largest factor along an axis.
+      most: Logarithm of the largest factor along an axis; half of it for what looks the same upside down,
+        such as a box, whose axes are told by their lengths alone.
       key: Draws the factors.
     """
+    turned_over = jnp.any(sample.turn_mask & (sample.turns[:, 0, 0] < -0.5))
+    most = jnp.where(turned_over, most / 2, most)
     each = jax.random.uniform(key, (3,), minval=-most, maxval=most)
     factors = jnp.exp(_symmetric(each, sample))
     kept = _longer(sample.extents) == _longer(sample.extents * factors)

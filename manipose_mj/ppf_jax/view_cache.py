@@ -34,6 +34,7 @@ from manipose_mj.ppf_jax.clouds import (
 from manipose_mj.ppf_jax.occlusion import Occluder
 from manipose_mj.ppf_jax.rendering import Subject, render_clouds
 from manipose_mj.ppf_jax.source_frames import SourceLabel, label_bounds, source_label
+from manipose_mj.ppf_jax.tapering import taperable, tapered
 from manipose_mj.ppf_jax.view_settings import ViewSetting
 
 VIEWS_PER_FILE = 32
@@ -117,22 +118,26 @@ def batch_stream(
     return batches
 
 
-def catalogue_subject(category: str, index: int, *, resting: bool) -> Subject:
+def catalogue_subject(category: str, index: int, *, resting: bool, taper: float = 0.0) -> Subject:
     """An object of the catalogue, ready to be rendered.
 
     Args:
       category: Of the catalogue.
       index: Which object.
       resting: Whether its resting poses are needed, which take longer than the rest.
+      taper: How much wider its upper end is drawn than it is, as a share; of what can be
+        tapered (`tapering.py`) and does not rest.
     """
     row = CATALOGUE[category]
     specimen = row.generate(index)
-    body = specimen.bodies[0]
+    body, label = specimen.bodies[0], specimen.label
     surface, center = body.surface(), body.mass_properties.center_of_mass
-    poses = stable_poses(surface, center, label=specimen.label) if resting else ()
+    poses = stable_poses(surface, center, label=label) if resting else ()
     rests = [(pose.rotation, pose.height, pose.probability) for pose in poses]
+    if taper and taperable(label):
+        surface, label = tapered(surface, label, taper)
     name = row.instance(index)
-    return Subject.of_mesh(surface, specimen.label, name=name, category=category, rests=rests)
+    return Subject.of_mesh(surface, label, name=name, category=category, rests=rests)
 
 
 def source_labels(clouds: Sequence[LabelledCloud], *, jobs: int = 1) -> dict[str, SourceLabel]:
@@ -158,7 +163,7 @@ def cache_folder(category: str, setting: ViewSetting) -> Path:
 @cache
 def _code_hash(category: str, setting: ViewSetting) -> str:
     # Only what shapes and pictures come from: not all that builds assets.
-    modules = [render_clouds.__module__, CATALOGUE[category].module]
+    modules = [render_clouds.__module__, tapered.__module__, CATALOGUE[category].module]
     if setting.placement != "anywhere":
         modules.append(stable_poses.__module__)
     values = repr(replace(setting, name=""))  # its name is in the folder's
@@ -179,11 +184,16 @@ def _fill(category: str, index: int, setting: ViewSetting, views: int) -> int:
     files = _files(category, index, setting, views)
     missing = [number for number, path in enumerate(files) if not path.is_file()]
     if missing:
-        subject = catalogue_subject(category, index, resting=setting.placement != "anywhere")
-        occluders = _catalogue_occluders(subject.name) if setting.occluded else []
+        name, resting = CATALOGUE[category].instance(index), setting.placement != "anywhere"
+        subject = catalogue_subject(category, index, resting=resting)
+        occluders = _catalogue_occluders(name) if setting.occluded else []
         for number in missing:
             # Not the setting: the tables' settings show the same objects in the same random order.
-            rng = np.random.default_rng([zlib.crc32(subject.name.encode()), number])
+            seed = [zlib.crc32(name.encode()), number]
+            rng = np.random.default_rng(seed)
+            if setting.taper:
+                taper = np.random.default_rng([*seed, 1]).uniform(-setting.taper, setting.taper)
+                subject = catalogue_subject(category, index, resting=resting, taper=taper)
             first = number * VIEWS_PER_FILE
             clouds = render_clouds(
                 subject, setting, VIEWS_PER_FILE, rng, occluders=occluders, first=first

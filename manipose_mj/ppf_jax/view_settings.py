@@ -30,6 +30,8 @@ class ViewSetting:
       occluded: Share of views in which something in front hides a part.
       bleed: How far the segmentation's outline strays [pixels of the sensor's focal length].
       sensor: None for exact depth.
+      taper: How much wider or narrower the upper end of an object may be drawn than it is, as a share
+        (`tapering.py`); of rigid objects of the catalogue.
     """
 
     name: str
@@ -41,6 +43,7 @@ class ViewSetting:
     occluded: float = 0.0
     bleed: float = 0.7
     sensor: StructuredLight | None = KINECT
+    taper: float = 0.0
 
 
 _ANYWHERE = ViewSetting("anywhere", "anywhere")
@@ -60,6 +63,7 @@ SETTINGS: dict[str, ViewSetting] = {
             distance=(0.5, 1.3),
             off_centre=0.7,
             occluded=0.3,
+            taper=0.2,
         ),
     )
 }

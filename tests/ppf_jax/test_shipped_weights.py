@@ -20,11 +20,11 @@ from manipose_mj.ppf_jax.view_settings import view_setting
 
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
 # Published: cm, deg. Means; medians where a few views are mistaken for another side, which weighs on a mean.
-MEANS = {"bowl": (0.10, 0.7), "cup": (0.07, 0.58), "hammer": (0.15, 1.1), "razor": (0.10, 1.3)}
-MEDIANS = {"box": (0.16, 0.71), "mug": (0.13, 1.6)}
+MEANS = {"bowl": (0.10, 0.7), "cup": (0.07, 0.57), "hammer": (0.15, 0.94), "plate": (0.10, 0.41)}
+MEDIANS = {"box": (0.16, 0.71), "mug": (0.11, 1.27), "razor": (0.08, 1.00)}
 
 
-@pytest.mark.parametrize("name", ["bowl", "box", "cup", "hammer", "mug", "razor"])
+@pytest.mark.parametrize("name", [*MEANS, *MEDIANS])
 def test_they_load_and_are_small(name):
     assert PoseEstimator.load(name).trained.categories == (name,)
     assert (FOLDER / f"{name}.npz").stat().st_size < 2e6
@@ -51,7 +51,7 @@ def test_a_category_without_weights_gets_its_type_s():
 )
 def test_those_of_a_type_reproduce_a_published_figure(name, category, cm, deg):
     clouds = catalogue_clouds(category, "test", view_setting("anywhere"), views=4, jobs=1)
-    found = answers(PoseEstimator.load(name), clouds)
+    found = answers(PoseEstimator.load(name), clouds, timed=0)
     figures = summary(pose_errors(found.poses, clouds))
     assert figures["deg_median"] == pytest.approx(deg, abs=0.1)
     assert figures["origin_cm_median"] == pytest.approx(cm, abs=0.02)
@@ -61,7 +61,7 @@ def test_those_of_a_type_reproduce_a_published_figure(name, category, cm, deg):
 @pytest.mark.parametrize("name", [*MEANS, *MEDIANS])
 def test_they_reproduce_their_published_figures(name):
     clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=16, jobs=1)
-    found = answers(PoseEstimator.load(name), clouds)
+    found = answers(PoseEstimator.load(name), clouds, timed=0)
     figures = summary(pose_errors(found.poses, clouds))
     cm, deg = (MEANS | MEDIANS)[name]
     kind = "mean" if name in MEANS else "median"
@@ -69,7 +69,7 @@ def test_they_reproduce_their_published_figures(name):
     # The last digit of the table, and what the rounding of another machine may turn.
     assert figures[f"origin_cm_{kind}"] == pytest.approx(cm, abs=0.01)
     assert figures[f"deg_{kind}"] == pytest.approx(deg, abs=0.1)
-    assert figures["flipped"] == 0.0
+    assert figures["flipped"] <= (0.01 if name == "razor" else 0.0)
     assert np.isfinite(found.confidence).all()
 
 

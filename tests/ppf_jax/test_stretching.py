@@ -29,7 +29,10 @@ def _stretched(category, indices, views):
 def test_the_label_goes_with_the_points_and_normals_stay_normal(category):
     before, after = _stretched(category, [0, 1], 6)
     factors = after.extents / before.extents
-    assert np.all(np.abs(np.log(factors)) < MOST + 1e-5) and np.ptp(factors, axis=0).max() > 0.05
+    # A box's axes are told by its lengths alone: it keeps more of them.
+    most = MOST / 2 if category == "box" else MOST
+    farthest = np.abs(np.log(factors)).max()
+    assert 0.8 * most < farthest < most + 1e-5
     assert np.array_equal(after.pose[:, :3, :3], before.pose[:, :3, :3])
     for i, count in enumerate(before.mask.sum(axis=1)):
         own, other = (
