@@ -30,8 +30,8 @@ def stretched(sample: CloudBatch, most: float, *, key: PRNGKeyArray) -> CloudBat
       key: Draws the factors.
     """
     turned_over = jnp.any(sample.turn_mask & (sample.turns[:, 0, 0] < -0.5))
-    most = jnp.where(turned_over, most / 2, most)
-    each = jax.random.uniform(key, (3,), minval=-most, maxval=most)
+    own = jnp.where(turned_over, most / 2, most)
+    each = jax.random.uniform(key, (3,), minval=-own, maxval=own)
     factors = jnp.exp(_symmetric(each, sample))
     kept = _longer(sample.extents) == _longer(sample.extents * factors)
     # Where the order of the lengths would change, the object keeps its proportions.
