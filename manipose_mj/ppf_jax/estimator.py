@@ -19,7 +19,13 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
-from manipose_mj.ppf_jax.model import Estimates, EstimatingModel, PoseModel, estimate_batch
+from manipose_mj.ppf_jax.model import (
+    Estimates,
+    EstimatingModel,
+    PoseModel,
+    estimate_batch,
+    estimate_sample,
+)
 from manipose_mj.ppf_jax.outliers import not_alone
 from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load_weights
 
@@ -118,16 +124,15 @@ class PoseEstimator:
         """
         points, normals = _checked(cloud, key)
         size, model = bucket(len(points)), self.trained.model
-        if normals is None:
-            normals = np.zeros_like(points)
-            rows = np.arange(len(points))
-            if isinstance(model, PoseModel):
-                # Normals take longer than all else outside the networks: only where one looks.
-                looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
-                rows = looked_at[looked_at < len(points)]
-            normals[rows] = cloud_normals(points, rows)
-        padded = _padded(points, normals, size)
-        return _as_estimate(_estimate(model, *padded, key=key))
+        if not isinstance(model, PoseModel):
+            normals = cloud_normals(points) if normals is None else normals
+            return _as_estimate(_estimate(model, *_padded(points, normals, size), key=key))
+        # Only where one looks: normals take longer than all else outside the networks.
+        looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
+        rows = looked_at[looked_at < len(points)]
+        normals = cloud_normals(points, rows) if normals is None else normals[rows]
+        sample = _padded(points[rows], normals, len(looked_at))
+        return _as_estimate(_estimate_sample(model, *sample, key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -169,6 +174,18 @@ def _estimate(
     key: PRNGKeyArray,
 ) -> Estimates:
     return model.estimate(points, normals, mask, key=key)
+
+
+@jax.jit
+def _estimate_sample(
+    model: PoseModel,
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    *,
+    key: PRNGKeyArray,
+) -> Estimates:
+    return estimate_sample(model, points, normals, mask, key=key)
 
 
 @jax.jit

@@ -171,9 +171,23 @@ def estimate_cloud(
       mask: True for points, false for padding.
       key: Draws the sample, the pairs and the free space.
     """
+    sample_key = jax.random.split(key, 3)[0]
+    sample = sampled(points, normals, mask, count=model.config.points, key=sample_key)
+    return estimate_sample(model, *sample, key=key)
+
+
+def estimate_sample(
+    model: PoseModel,
+    points: Float[Array, "sample 3"],
+    normals: Float[Array, "sample 3"],
+    mask: Bool[Array, "sample"],
+    *,
+    key: PRNGKeyArray,
+) -> Estimates:
+    """`estimate_cloud` of the rows of a cloud that `PoseModel.looks_at` names, in their order."""
     config = model.config
-    sample_key, pair_key, free_key = jax.random.split(key, 3)
-    cloud = normalised(*sampled(points, normals, mask, count=config.points, key=sample_key))
+    _, pair_key, free_key = jax.random.split(key, 3)
+    cloud = normalised(points, normals, mask)
     votes, log_extents = cast_votes(model, cloud, config.pairs, key=pair_key)
     first = faced(vote(votes, config.symmetry, config.voting), cloud, config.symmetry)
     free = free_space(cloud, config.refinement, key=free_key)

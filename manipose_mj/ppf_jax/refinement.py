@@ -32,7 +32,7 @@ LEVELS: tuple[tuple[float, float], ...] = (
 _TYPICAL_TURNS = np.radians([2.5, 10.0, 30.0, 110.0])
 CONFIDENT_LEVEL = 1  # the level whose probability is reported as confidence
 _FARTHEST_TURN = 1.0  # of one correction [rad]
-_INPUTS = 10
+_INPUTS = 10  # a point, its normal, its view; 1 for empty space, whose points have no more
 
 
 @dataclass(frozen=True)
@@ -119,14 +119,15 @@ class Refiner(eqx.Module):
           origin: Of the hypothesis, in the cloud's units.
           agreement: Share of votes that the hypothesis satisfies, of each kind.
         """
-        surface = jnp.concatenate([cloud.points - origin, cloud.normals, cloud.views])
-        surface = (surface @ rotation).reshape(3, -1, 3).transpose(1, 0, 2).reshape(-1, 9)
-        surface = jnp.pad(surface, ((0, 0), (0, 1)))
-        empty = jnp.pad((free - origin) @ rotation, ((0, 0), (0, _INPUTS - 3)))
-        empty = empty.at[:, -1].set(1.0)
-        seen = jax.nn.relu(self.second(jax.nn.relu(self.first(surface))))
+        # The first layer is linear: its weights are turned and its bias moved, not every point.
+        *of_surface, of_empty = jnp.split(self.first.weight, (3, 6, 9))
+        turned = jnp.concatenate([rotation @ weight for weight in of_surface])
+        bias = self.first.bias - origin @ turned[:3]
+        surface = jnp.concatenate([cloud.points, cloud.normals, cloud.views], axis=-1)
+        seen = jax.nn.relu(self.second(jax.nn.relu(surface @ turned + bias)))
         seen = jnp.where(cloud.mask[:, None], seen, 0.0)
-        through = jax.nn.relu(self.second(jax.nn.relu(self.first(empty))))
+        empty = free @ turned[:3] + (bias + of_empty[0])
+        through = jax.nn.relu(self.second(jax.nn.relu(empty)))
         size = jnp.log(cloud.scale / 0.05)[None]
         about = self.of_cloud(jnp.concatenate([size, log_extents, agreement]))
         pooled = jnp.concatenate(

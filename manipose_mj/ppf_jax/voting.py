@@ -112,17 +112,16 @@ def agreement(
     votes: PairVotes, hypothesis: Hypotheses, symmetry: CommonSymmetry
 ) -> Float[Array, "h 4"]:
     """The certainty-weighted share of votes for mu, nu, X and Y that each hypothesis satisfies."""
-    offset = hypothesis.origin[:, None] - votes.start
-    mu = jnp.sum(offset * votes.along, axis=-1)
-    nu = jnp.sqrt(jnp.maximum(jnp.sum(offset**2, axis=-1) - mu**2, 1e-8))
-    cosines = jnp.einsum("pi,hij->hpj", votes.along, hypothesis.rotation[:, :, :2])
-    x = jnp.abs(cosines[..., 0]) if symmetry.unsigned_x else cosines[..., 0]
-    y = jnp.abs(cosines[..., 1]) if symmetry.unsigned_y else cosines[..., 1]
-    residual = jnp.stack([mu, nu, x, y], axis=-1) - votes.values[:, :PAIR_OUTPUTS]
-    log_scale = votes.log_scale[:, :PAIR_OUTPUTS]
-    weight = jnp.exp(-2 * log_scale)
-    kept = weight / (1 + (residual / jnp.exp(log_scale)) ** 2)
-    return jnp.sum(kept, axis=1) / jnp.sum(weight, axis=0)
+    along = votes.along.T[:, None]
+    offset = hypothesis.origin.T[:, :, None] - votes.start.T[:, None]
+    mu = _dots(offset, along)
+    nu = jnp.sqrt(jnp.maximum(_dots(offset, offset) - mu**2, 1e-8))
+    x, y = (_dots(hypothesis.rotation[:, :, i].T[:, :, None], along) for i in (0, 1))
+    x = jnp.abs(x) if symmetry.unsigned_x else x
+    y = jnp.abs(y) if symmetry.unsigned_y else y
+    residual = jnp.stack([mu, nu, x, y], axis=1) - votes.values[:, :PAIR_OUTPUTS].T
+    weight = jnp.exp(-2 * votes.log_scale[:, :PAIR_OUTPUTS].T)
+    return jnp.sum(_cauchy(weight, residual), axis=-1) / jnp.sum(weight, axis=-1)
 
 
 def _cosine_votes(votes: PairVotes, column: int, unsigned: bool) -> list[_Linear]:
@@ -148,10 +147,10 @@ def _direction_scores(votes: list[_Linear], candidates: Float[Array, "c 3"]) -> 
     """How well each candidate satisfies the votes, blurred to the candidates' spacing."""
 
     def of(votes: _Linear) -> Array:
-        cosine = votes.direction @ candidates.T
+        cosine = _dots(votes.direction.T[:, :, None], candidates.T[:, None])
         residual = (jnp.abs(cosine) if votes.unsigned else cosine) - votes.value[:, None]
-        spread = 1 / votes.certainty + 4 * jnp.pi / len(candidates) / 4
-        kernel = 1 / (1 + residual**2 / spread[:, None])
+        sharpness = 1 / (1 / votes.certainty + 4 * jnp.pi / len(candidates) / 4)
+        kernel = 1 / (1 + residual**2 * sharpness[:, None])
         return votes.certainty @ kernel
 
     return sum((of(kind) for kind in votes[1:]), start=of(votes[0]))
@@ -179,19 +178,15 @@ def _polished_direction(
     votes: list[_Linear], start: Float[Array, "3"], rounds: int
 ) -> Float[Array, "3"]:
     """The direction near `start` that the votes around it agree on."""
-    direction, certainty = (jnp.concatenate([v[i] for v in votes]) for i in (0, 2))
+    columns = jnp.concatenate([v.direction.T for v in votes], axis=1)
+    value, certainty = (jnp.concatenate([v[i] for v in votes]) for i in (1, 2))
+    unsigned = np.repeat([v.unsigned for v in votes], [len(v.value) for v in votes])
 
     def refine(_: int, axis: Array) -> Array:
-        cosine = direction @ axis
-        value = jnp.concatenate(
-            [
-                jnp.where(v.direction @ axis < 0, -v.value, v.value) if v.unsigned else v.value
-                for v in votes
-            ]
-        )
-        weight = _cauchy(certainty, cosine - value)
-        solved = _solve(direction, value, weight, axis)
-        return _unit(solved, axis)
+        cosine = axis @ columns
+        meant = jnp.where(unsigned & (cosine < 0), -value, value) if unsigned.any() else value
+        weight = _cauchy(certainty, cosine - meant)
+        return _unit(_solve(columns, meant, weight, axis), axis)
 
     return jax.lax.fori_loop(0, rounds, refine, start)
 
@@ -221,57 +216,58 @@ def _coarse_origin(votes: PairVotes, config: VotingConfig) -> Float[Array, "3"]:
     side = np.linspace(-config.origin_reach, config.origin_reach, config.origin_steps)
     grid = jnp.asarray(np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3))
     grid = grid.astype(votes.start.dtype)
-    # |o - a|^2 and (o - a).d for all votes and candidates, as products of matrices.
-    mu = votes.along @ grid.T - jnp.sum(votes.along * votes.start, axis=-1)[:, None]
-    squares = (
-        jnp.sum(grid**2, axis=-1)
-        - 2 * votes.start @ grid.T
-        + jnp.sum(votes.start**2, axis=-1)[:, None]
-    )
-    nu = jnp.sqrt(jnp.maximum(squares - mu**2, 1e-8))
+    # For all votes and candidates; no product of matrices, which would be written out and read again.
+    offset = grid.T[:, None] - votes.start.T[:, :, None]
+    mu = _dots(offset, votes.along.T[:, :, None])
+    nu = jnp.sqrt(jnp.maximum(_dots(offset, offset) - mu**2, 1e-8))
     spacing = (side[1] - side[0]) / 2
-    spread = jnp.exp(2 * votes.log_scale[:, :2]) + spacing**2
-    residual = (mu - votes.values[:, :1]) ** 2 / spread[:, :1]
-    residual = residual + (nu - votes.values[:, 1:2]) ** 2 / spread[:, 1:]
+    sharpness = 1 / (jnp.exp(2 * votes.log_scale[:, :2]) + spacing**2)
+    residual = (mu - votes.values[:, :1]) ** 2 * sharpness[:, :1]
+    residual = residual + (nu - votes.values[:, 1:2]) ** 2 * sharpness[:, 1:]
     certainty = jnp.exp(-votes.log_scale[:, 0] - votes.log_scale[:, 1])
     return grid[jnp.argmax(certainty @ (1 / (1 + residual)))]
 
 
 def _polished_origin(votes: PairVotes, start: Float[Array, "3"], rounds: int) -> Float[Array, "3"]:
     """The point nearest to the circles (mu, nu) of the votes around it."""
-    certainty = jnp.exp(-2 * votes.log_scale[:, :2])
+    start_columns, along = votes.start.T, votes.along.T
+    wanted = votes.values[:, :2].T.reshape(-1)
+    certainty = jnp.exp(-2 * votes.log_scale[:, :2]).T.reshape(-1)
 
     def refine(_: int, origin: Array) -> Array:
-        offset = origin - votes.start
-        mu = jnp.sum(offset * votes.along, axis=-1)
-        across = offset - mu[:, None] * votes.along
-        nu = jnp.sqrt(jnp.sum(across**2, axis=-1) + 1e-8)
-        across = across / nu[:, None]
-        rows = jnp.concatenate([votes.along, across])
-        wanted = jnp.concatenate([votes.values[:, 0], votes.values[:, 1]])
+        offset = origin[:, None] - start_columns
+        mu = _dots(offset, along)
+        across = offset - mu * along
+        nu = jnp.sqrt(_dots(across, across) + 1e-8)
+        columns = jnp.concatenate([along, across / nu], axis=1)
         residual = jnp.concatenate([mu, nu]) - wanted
-        weight = _cauchy(jnp.concatenate([certainty[:, 0], certainty[:, 1]]), residual)
         # The change that takes the residuals away.
-        return origin - _solve(rows, residual, weight, jnp.zeros(3))
+        return origin - _solve(columns, residual, _cauchy(certainty, residual), jnp.zeros(3))
 
     return jax.lax.fori_loop(0, rounds, refine, start)
 
 
-def _cauchy(certainty: Float[Array, "p"], residual: Float[Array, "p"]) -> Float[Array, "p"]:
+def _cauchy(
+    certainty: Float[Array, "*#b p"], residual: Float[Array, "*b p"]
+) -> Float[Array, "*b p"]:
     return certainty / (1 + certainty * residual**2)
 
 
+def _dots(a: Float[Array, "3 *#b"], b: Float[Array, "3 *#b"]) -> Float[Array, "*b"]:
+    """Inner products of vectors whose coordinates come first: each is one run of memory."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def _solve(
-    rows: Float[Array, "p 3"],
+    columns: Float[Array, "3 p"],
     values: Float[Array, "p"],
     weight: Float[Array, "p"],
     prior: Float[Array, "3"],
 ) -> Float[Array, "3"]:
-    """Weighted least squares of `rows @ unknown = values`, drawn a little towards `prior`."""
-    weight = weight / (jnp.sum(weight) + 1e-12)
-    weighted = rows * weight[:, None]
-    matrix = rows.T @ weighted + _RIDGE * jnp.eye(3)
-    return _solve3(matrix, values @ weighted + _RIDGE * prior)
+    """Weighted least squares of `unknown @ columns = values`, drawn a little towards `prior`."""
+    weighted = columns * (weight / (jnp.sum(weight) + 1e-12))
+    matrix = weighted @ columns.T + _RIDGE * jnp.eye(3)
+    return _solve3(matrix, weighted @ values + _RIDGE * prior)
 
 
 def _solve3(matrix: Float[Array, "3 3"], right: Float[Array, "3"]) -> Float[Array, "3"]:

@@ -33,24 +33,33 @@ def mug():
     return half_visible_clouds("mug", [0], 1, points=250)[0]
 
 
-def test_one_compilation_for_each_bucket(trained, mug, monkeypatch):
+def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
     traced = []
-    whole = PoseModel.estimate
+    whole = module.estimate_sample
     monkeypatch.setattr(
-        PoseModel,
-        "estimate",
+        module,
+        "estimate_sample",
         lambda m, p, *a, key: traced.append(len(p)) or whole(m, p, *a, key=key),
     )
     estimator = PoseEstimator(trained)
     for count in (40, 130, 250, 99):
         answer = estimator.estimate(mug.points[:count], key=KEY)
         assert answer.pose.shape == (4, 4) and np.isfinite(answer.pose).all()
-    assert traced == [256]
+    assert traced == [CONFIG.points]
     repeated = np.tile(mug.points, (6, 1)) + np.float32(1e-4)
     assert [bucket(n) for n in (32, 256, 257, 512, 1024)] == [256, 256, 512, 512, 1024]
     estimator.estimate(repeated, key=KEY)
     estimator.estimate(repeated[:900], key=KEY)
-    assert traced == [256, 1024]
+    assert traced == [CONFIG.points]
+
+
+def test_one_object_is_estimated_as_by_the_whole_model(trained, mug):
+    found = PoseEstimator(trained).estimate(mug, key=KEY)
+    room = ((0, 256 - len(mug)), (0, 0))
+    points, normals = np.pad(mug.points, room), np.pad(mug.normals, room)
+    whole = trained.model.estimate(points, normals, np.arange(256) < len(mug), key=KEY)
+    np.testing.assert_allclose(found.pose, whole.poses[0], atol=1e-3)
+    assert found.confidence == pytest.approx(float(whole.confidence[0]), abs=1e-3)
 
 
 def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
