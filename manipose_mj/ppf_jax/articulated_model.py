@@ -155,7 +155,7 @@ def estimate_parts(
     few = points[chosen], normals[chosen], mask[chosen]
     towards = -unit(jnp.sum(jnp.where(few[2][:, None], few[0], 0.0), axis=0))
     settled = body_rotations(model, *few, key=body_key)
-    settled = settled.at[0].set(turned_by_edges(settled[0], *several, config.edges))
+    settled = jax.vmap(lambda axes: turned_by_edges(axes, *several, config.edges))(settled)
     frames = jax.vmap(lambda axes: candidates(axes, towards))(settled).reshape(-1, 3, 3)
     rows = model.parts.neighbours(body_cloud(*few, frames[0])[0])
     logits = jax.lax.map(lambda frame: model.parts(body_cloud(*few, frame)[0], rows).frame, frames)

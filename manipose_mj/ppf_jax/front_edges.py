@@ -26,6 +26,8 @@ class FrontEdgesConfig:
       bin: In which points are counted [m].
       step: Between the directions that are tried [rad]; they go on half a degree about the best.
       sure: How many times as abrupt as the median of all directions the best must be.
+      alone: Share of the points that face along any axis which the plane's must be: where others show as
+        well, they tell the turn.
     """
 
     points: int = 6144
@@ -34,6 +36,7 @@ class FrontEdgesConfig:
     bin: float = 0.006
     step: float = float(np.radians(1.0))
     sure: float = 2.0
+    alone: float = 0.9
 
 
 _REACH = 2.0  # from the points' mean [m]
@@ -50,7 +53,7 @@ def turned_by_edges(
 ) -> Float[Array, "3 3"]:
     """The rotation, turned about the axis of its largest plane until the plane's edges run along the others.
 
-    By at most 45 deg; as it was where the edges do not tell.
+    By at most 45 deg; as it was where the edges do not tell, or other planes do.
 
     Args:
       rotation: Whose axes planes are across; only the turn about one may be wrong.
@@ -62,7 +65,9 @@ def turned_by_edges(
     mean = jnp.sum(jnp.where(mask[:, None], points, 0.0), axis=0) / jnp.maximum(jnp.sum(mask), 1)
     own = (points - mean) @ rotation
     facing = (jnp.abs(normals @ rotation) > config.facing) & mask[:, None]
-    across = jnp.argmax(jnp.sum(facing, axis=0))
+    count = jnp.sum(facing, axis=0)
+    across = jnp.argmax(count)
+    alone = count[across] > config.alone * jnp.sum(count)
     # The plane's normal first.
     order = (across + jnp.arange(3)) % 3
     own, facing = own[:, order], facing[:, across]
@@ -78,7 +83,7 @@ def turned_by_edges(
     angles = jnp.arange(-np.pi / 4, np.pi / 4, config.step)
     found = jax.lax.map(abruptness, angles, batch_size=8)
     best = jnp.argmax(found)
-    sure = found[best] > config.sure * jnp.median(found)
+    sure = alone & (found[best] > config.sure * jnp.median(found))
     fine = angles[best] + jnp.asarray(_FINE)
     angle = fine[jnp.argmax(jax.lax.map(abruptness, fine, batch_size=8))]
     cos, sin = jnp.cos(angle), jnp.sin(angle)

@@ -23,6 +23,8 @@ from asset_pipeline.procedural.articulated.portion import moved, portion
 from asset_pipeline.procedural.solids import box
 from manipose_mj.poses import SymmetryGroup, compose
 
+_LEAST_DEPTH = 0.017  # of knobs: their middles stand out from the deepest panel's frame [m]
+
 
 @dataclass(frozen=True)
 class BlockHandle:
@@ -49,14 +51,14 @@ class BlockHandle:
 
 
 def random_handle(rng: np.random.Generator, longest: float) -> Handle:
-    """A handle that takes at most so much room along its X [m]; a knob of 12 mm always may be."""
+    """A handle that takes at most so much room along its X [m]; a knob of 10 mm always may be."""
     kind = rng.choice(["bar", "bow", "knob", "edge", "block"], p=[0.42, 0.16, 0.26, 0.06, 0.10])
     # As many short ones as long ones.
     length = float(np.exp(rng.uniform(np.log(0.06), np.log(0.70))))
     length = min(length, longest)
     if kind == "knob" or length < 0.05:
-        diameter = rng.uniform(0.012, 0.042)
-        depth = diameter * rng.uniform(0.6, 1.3)
+        diameter = float(np.exp(rng.uniform(np.log(0.010), np.log(0.042))))
+        depth = max(diameter * rng.uniform(0.6, 1.3), _LEAST_DEPTH)
         stem = diameter * rng.uniform(0.4, 0.6)
         return Knob(diameter=diameter, stem=stem, depth=depth, neck=rng.uniform(0.30, 0.45))
     standoff = rng.uniform(0.014, 0.045)

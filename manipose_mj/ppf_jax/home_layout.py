@@ -67,6 +67,13 @@ _DISHWASHER = HomeStyle(
     flaps=0.85,
     upwards=0.1,
 )
+_MICROWAVE = HomeStyle(
+    *((1, 1), (0.25, 0.50), (1, 1), (0.18, 0.45), (0.28, 0.50), (0.02, 0.07)),
+    open=0.0,
+    drawers=0.0,
+    flaps=0.15,
+    upwards=0.1,
+)
 # Few and wide doors: models of furniture are often of no true size.
 _WIDE_DOORS = HomeStyle(
     *((1, 2), (0.55, 1.05), (1, 2), (0.30, 0.95), (0.30, 0.60)),
@@ -78,7 +85,7 @@ _WIDE_DOORS = HomeStyle(
 _SHELF = HomeStyle((1, 3), (0.28, 0.70), (3, 6), (0.20, 0.42), depth=(0.25, 0.45), open=0.4)
 STYLES = (
     *(_TALL_DOORS, _DRESSER, _FLAPS, _WARDROBE, _DESK, _SIDEBOARD),
-    *(_FRIDGE, _TALL_DOORS, _SHELF, _DISHWASHER, _WARDROBE, _WIDE_DOORS, _WIDE_DOORS),
+    *(_FRIDGE, _TALL_DOORS, _SHELF, _DISHWASHER, _WARDROBE, _WIDE_DOORS, _WIDE_DOORS, _MICROWAVE),
 )
 _MOST = 10  # parts
 _WIDEST, _HIGHEST = 2.2, 2.1  # [m]

@@ -117,7 +117,8 @@ def door(
     middle = _within(along[0] + handle_at * (along[1] - along[0]), along, reach + _MARGIN)
     foot = np.array([c.face - c.front, *((free, middle) if upright else (middle, free))])
     hinge = across[1] if at_low else across[0]
-    origin = np.array([c.face - rng.choice([0.0, 1.0]) * c.front, 0.0, 0.0])
+    # Anywhere in the door's thickness: no view of a shut door tells.
+    origin = np.array([c.face - rng.uniform() * c.front, 0.0, 0.0])
     origin[1 if upright else 2] = hinge
     travel = rng.uniform(np.pi / 2, np.pi if rng.random() < 0.3 else 2.2)
     mounted = handle.mounted(foot, direction)
@@ -168,7 +169,7 @@ def _front(c: Cabinet, y: Span, z: Span, style: str) -> tuple[tuple[Shape, ...],
 
 
 def _decor(c: Cabinet, y: Span, z: Span, mounted: Mounted, rng: np.random.Generator) -> list[Shape]:
-    """Flat plates on some fronts, clear of the handle: no handles, though they stand out."""
+    """Flat plates on some fronts, clear of the handle and no higher: no handles, though they stand out."""
     if rng.random() < 0.8:
         return []
     found, label = [], mounted.label
@@ -179,7 +180,8 @@ def _decor(c: Cabinet, y: Span, z: Span, mounted: Mounted, rng: np.random.Genera
         if np.all(np.abs(low + size / 2 - label.origin[1:]) < size / 2 + reach):
             continue
         face = c.face - c.front
-        found.append(box((face - rng.uniform(0.002, 0.015), *low), (face, *(low + size))))
+        thick = rng.uniform(0.002, max(0.002, min(0.015, face - label.origin[0])))
+        found.append(box((face - thick, *low), (face, *(low + size))))
     return found
 
 

@@ -156,9 +156,20 @@ def with_weights_of(model: Any, other: Any) -> Any:
     """
     mine, theirs = jax.tree.leaves(model), jax.tree.leaves(other)
     if [np.shape(leaf) for leaf in mine] != [np.shape(leaf) for leaf in theirs]:
-        raise InputError("the weights to start from are of a model of other sizes; train anew")
+        raise InputError("the weights are of a model of other sizes; train anew")
     leaves = [jnp.asarray(new, old.dtype) for old, new in zip(mine, theirs, strict=True)]
     return jax.tree.unflatten(jax.tree.structure(model), leaves)
+
+
+def mean_weights(models: Sequence[Any]) -> Any:
+    """The first model with the mean of all their weights.
+
+    Raises:
+      InputError: Their sizes differ.
+    """
+    alike = [jax.tree.leaves(with_weights_of(models[0], other)) for other in models]
+    means = [jnp.mean(jnp.stack(leaves), axis=0) for leaves in zip(*alike, strict=True)]
+    return jax.tree.unflatten(jax.tree.structure(models[0]), means)
 
 
 def learning_rate(config: TrainingConfig, step: int, share: float) -> float:

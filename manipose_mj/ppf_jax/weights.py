@@ -22,6 +22,7 @@ from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, Articulated
 from manipose_mj.ppf_jax.close_look import CloseLook
 from manipose_mj.ppf_jax.cppf import CppfModel
 from manipose_mj.ppf_jax.cppf_voting import CppfConfig
+from manipose_mj.ppf_jax.front_edges import FrontEdgesConfig
 from manipose_mj.ppf_jax.handle_fit import HandleFitConfig
 from manipose_mj.ppf_jax.model import EstimatingModel, ModelConfig, PoseModel
 from manipose_mj.ppf_jax.network import NetworkConfig
@@ -155,6 +156,7 @@ def _articulated_config(stored: dict[str, Any]) -> ArticulatedConfig:
     own = {
         "body": NetworkConfig(**stored["body"]),
         "body_voting": VotingConfig(**stored["body_voting"]),
+        "edges": FrontEdgesConfig(**_known(FrontEdgesConfig, stored.get("edges", {}))),
         "network": PartNetworkConfig(**_tuples(stored["network"])),
         "voting": PartVotingConfig(**_known(PartVotingConfig, stored["voting"])),
         "close": CloseLook(**_known(CloseLook, stored.get("close", {}))),

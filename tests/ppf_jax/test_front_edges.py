@@ -44,6 +44,14 @@ def test_a_rectangle_s_edges_right_a_frame_of_any_order(which, off):
     assert np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1))) < 0.6
 
 
+def test_where_another_plane_shows_it_is_left_to_that():
+    body, rng = rotation_about(np.array([0.6, 0.0, 0.8]), 2.0), np.random.default_rng(2)
+    points, normals, mask = _front(rng, body, lambda plane: np.ones(len(plane), bool))
+    turned = body @ rotation_about(_X, np.radians(12.0))
+    normals[:1500] = turned[:, 1]
+    np.testing.assert_allclose(_TURNED(turned, points, normals, mask), turned, atol=1e-6)
+
+
 def test_a_disc_has_no_edges_to_go_by():
     body = rotation_about(np.array([0.6, 0.0, 0.8]), 2.0)
     cloud = _front(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -14,6 +15,11 @@ from manipose_mj.ppf_jax.clouds import LabelledCloud
 from manipose_mj.ppf_jax.curve_picture import draw_curve
 from manipose_mj.ppf_jax.estimator import PoseEstimate
 from manipose_mj.ppf_jax.evaluation import answers, categories_of
+
+CUP, BOWL = (
+    str(resources.files("manipose_mj.ppf_jax") / "weights" / f"{name}.npz")
+    for name in ("cup", "bowl")
+)
 
 
 @pytest.mark.parametrize(
@@ -27,6 +33,9 @@ from manipose_mj.ppf_jax.evaluation import answers, categories_of
         (["pose", "train", "axial", "--leave-out", "mug"], "unknown category of axial 'mug'"),
         (["pose", "train", "mug", "--setting", "anywere"], "did you mean anywhere"),
         (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),
+        (["pose", "average", "a.npz", "--out", "b.npz"], "1 files of weights"),
+        (["pose", "average", CUP, "none.npz", "--out", "b.npz"], "none.npz: no such file"),
+        (["pose", "average", CUP, BOWL, "--out", "b.npz"], "weights of ours, bowl, unified"),
     ],
 )
 def test_wrong_input_is_one_line(command, message, capsys):

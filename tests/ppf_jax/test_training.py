@@ -13,7 +13,7 @@ from half_visible import half_visible_clouds
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.clouds import batch_clouds
 from manipose_mj.ppf_jax.losses import LossConfig
-from manipose_mj.ppf_jax.model import ModelConfig
+from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
 from manipose_mj.ppf_jax.network import NetworkConfig
 from manipose_mj.ppf_jax.refinement import RefinementConfig
 from manipose_mj.ppf_jax.symmetry import common_symmetry
@@ -23,6 +23,7 @@ from manipose_mj.ppf_jax.training import (
     TrainingConfig,
     evaluate,
     learning_rate,
+    mean_weights,
     train,
 )
 from manipose_mj.ppf_jax.voting import VotingConfig
@@ -131,6 +132,18 @@ def test_it_starts_from_weights_of_the_same_sizes(bowls, model_config, whole, tm
     )
     with pytest.raises(InputError, match="other sizes"):
         train(_batches(bowls), narrow, CONFIG, tmp_path / "b", initial=whole[0], minutes=1e-9)
+
+
+def test_the_mean_of_weights_is_of_one_model_s_sizes(model_config, whole):
+    other = PoseModel(model_config, rng=np.random.default_rng(3))
+    mean = mean_weights([whole[0], other])
+    for found, *both in zip(*map(jax.tree.leaves, (mean, whole[0], other)), strict=True):
+        np.testing.assert_allclose(found, np.mean(both, axis=0), atol=1e-6)
+    narrow = dataclasses.replace(
+        model_config, network=dataclasses.replace(model_config.network, width=8)
+    )
+    with pytest.raises(InputError, match="other sizes"):
+        mean_weights([other, PoseModel(narrow, rng=np.random.default_rng(3))])
 
 
 def test_no_time_means_no_steps(bowls, model_config, tmp_path):
