@@ -57,7 +57,8 @@ def test_one_object_is_estimated_as_by_the_whole_model(trained, mug):
     found = PoseEstimator(trained).estimate(mug, key=KEY)
     room = ((0, 256 - len(mug)), (0, 0))
     points, normals = np.pad(mug.points, room), np.pad(mug.normals, room)
-    whole = trained.model.estimate(points, normals, np.arange(256) < len(mug), key=KEY)
+    estimate = jax.jit(lambda *cloud: trained.model.estimate(*cloud, key=KEY))
+    whole = estimate(points, normals, np.arange(256) < len(mug))
     np.testing.assert_allclose(found.pose, whole.poses[0], atol=1e-3)
     assert found.confidence == pytest.approx(float(whole.confidence[0]), abs=1e-3)
 
