@@ -176,16 +176,7 @@ def _estimate(
     return model.estimate(points, normals, mask, key=key)
 
 
-@jax.jit
-def _estimate_sample(
-    model: PoseModel,
-    points: Float[Array, "n 3"],
-    normals: Float[Array, "n 3"],
-    mask: Bool[Array, "n"],
-    *,
-    key: PRNGKeyArray,
-) -> Estimates:
-    return estimate_sample(model, points, normals, mask, key=key)
+_estimate_sample = jax.jit(estimate_sample)
 
 
 @jax.jit

@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from manipose_mj.ppf_jax.binned_counts import binned_counts
+
 
 @dataclass(frozen=True)
 class FrontEdgesConfig:
@@ -39,7 +41,7 @@ class FrontEdgesConfig:
     alone: float = 0.9
 
 
-_REACH = 2.0  # from the points' mean [m]
+_SPAN = (-2.0, 2.0)  # of what is looked at, from the points' mean [m]
 _DEPTH_BIN = 0.01  # [m]
 _FINE = np.radians(np.linspace(-0.75, 0.75, 7)).astype(np.float32)
 
@@ -71,8 +73,10 @@ def turned_by_edges(
     # The plane's normal first.
     order = (across + jnp.arange(3)) % 3
     own, facing = own[:, order], facing[:, across]
-    depth = _counts(own[:, 0], facing, _DEPTH_BIN)
-    middle = _DEPTH_BIN * (jnp.argmax(jnp.convolve(depth, jnp.ones(3), mode="same")) + 0.5) - _REACH
+    depth = binned_counts(own[:, 0], facing, _SPAN, _DEPTH_BIN)
+    middle = (
+        _DEPTH_BIN * (jnp.argmax(jnp.convolve(depth, jnp.ones(3), mode="same")) + 0.5) + _SPAN[0]
+    )
     within = facing & (jnp.abs(own[:, 0] - middle) < config.thick)
 
     def abruptness(angle: Array) -> Array:
@@ -95,15 +99,8 @@ def turned_by_edges(
     return jnp.where(sure, turned[:, (jnp.arange(3) - across) % 3], rotation)
 
 
-def _counts(
-    along: Float[Array, "n"], there: Bool[Array, "n"], width: float
-) -> Float[Array, "bins"]:
-    bins = round(2 * _REACH / width)
-    index = jnp.clip(jnp.floor((along + _REACH) / width).astype(jnp.int32), 0, bins - 1)
-    return jnp.bincount(index, there.astype(jnp.float32), length=bins)
-
-
 def _steps(along: Float[Array, "n"], there: Bool[Array, "n"], width: float) -> Float[Array, ""]:
     """How abruptly counts of points change."""
-    smooth = jnp.convolve(_counts(along, there, width), jnp.array([0.25, 0.5, 0.25]), mode="same")
+    counts = binned_counts(along, there, _SPAN, width)
+    smooth = jnp.convolve(counts, jnp.array([0.25, 0.5, 0.25]), mode="same")
     return jnp.sum(jnp.diff(smooth) ** 2)

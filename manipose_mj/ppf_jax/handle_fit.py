@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from manipose_mj.poses import compose
+from manipose_mj.ppf_jax.binned_counts import binned_counts
 from manipose_mj.ppf_jax.part_voting import unit
 from manipose_mj.ppf_jax.rotations import from_vector
 
@@ -134,8 +135,8 @@ def _fitted_handle(
         panel = _panel_height(own, mask)
         on = mask & (jnp.abs(own[:, 2]) < config.across) & (jnp.abs(own[:, 0]) < reach)
         on &= (own[:, 1] > config.height * panel) & (own[:, 1] < _FRONT)
-        high = _end(_counts(own[:, 0], on, _BIN, reach), _BIN, config.gap)
-        low = -_end(_counts(-own[:, 0], on, _BIN, reach), _BIN, config.gap)
+        high = _end(binned_counts(own[:, 0], on, (0.0, reach), _BIN), _BIN, config.gap)
+        low = -_end(binned_counts(-own[:, 0], on, (0.0, reach), _BIN), _BIN, config.gap)
         on &= (own[:, 0] <= high) & (own[:, 0] >= low)
         sure = (jnp.sum(on) >= config.least) & (high - low > config.turned)
         slope = jnp.where(sure, _slope(own[:, 0], own[:, 2], on), 0.0)
@@ -162,7 +163,7 @@ def _fitted_hinge(
     offset = points - centre
     of_door = mask & (jnp.abs(offset @ out - panel) < config.thick)
     of_door &= jnp.abs(offset @ axis) < config.strip
-    counts = _counts(offset @ across - config.begin, of_door, 2 * _BIN, _FARTHEST)
+    counts = binned_counts(offset @ across - config.begin, of_door, (0.0, _FARTHEST), 2 * _BIN)
     reach = _end(counts, 2 * _BIN, config.door_gap, least=_DOOR_LEAST)
     by = config.begin + reach - config.inset - voted
     plain = ~_has_notch(counts, reach, 2 * _BIN, config.notch)
@@ -175,22 +176,10 @@ def _panel_height(own: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Arr
     """Where most of the points behind a handle are, from its centre outwards [m]."""
     behind = mask & (jnp.abs(own[:, 0]) < _AROUND[0]) & (jnp.abs(own[:, 2]) < _AROUND[1])
     behind &= (own[:, 1] < _HIGHEST) & (own[:, 1] > _LOWEST)
-    bins = round((_HIGHEST - _LOWEST) / _PANEL_BIN)
-    index = jnp.floor((own[:, 1] - _LOWEST) / _PANEL_BIN).astype(jnp.int32)
-    counts = jnp.bincount(jnp.clip(index, 0, bins - 1), behind.astype(jnp.float32), length=bins)
+    counts = binned_counts(own[:, 1], behind, (_LOWEST, _HIGHEST), _PANEL_BIN)
     counts = jnp.convolve(counts, jnp.ones(3), mode="same")
     height = _LOWEST + (jnp.argmax(counts) + 0.5) * _PANEL_BIN
     return jnp.where(jnp.sum(behind) < 20, _USUAL, height)
-
-
-def _counts(
-    distance: Float[Array, "n"], there: Bool[Array, "n"], width: float, reach: float
-) -> Float[Array, "bins"]:
-    """Points in bins of a width from 0 on [m]."""
-    bins = round(reach / width)
-    index = jnp.floor(distance / width).astype(jnp.int32)
-    there = there & (index >= 0) & (index < bins)
-    return jnp.bincount(jnp.clip(index, 0, bins - 1), there.astype(jnp.float32), length=bins)
 
 
 def _end(

@@ -12,7 +12,7 @@ from half_visible import half_visible_clouds
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
-from manipose_mj.ppf_jax.model import ModelConfig, PoseModel
+from manipose_mj.ppf_jax.model import ModelConfig, PoseModel, estimate_sample
 from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.voting import VotingConfig
 from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
@@ -35,12 +35,12 @@ def mug():
 
 def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
     traced = []
-    whole = module.estimate_sample
-    monkeypatch.setattr(
-        module,
-        "estimate_sample",
-        lambda m, p, *a, key: traced.append(len(p)) or whole(m, p, *a, key=key),
-    )
+
+    def whole(model, points, *rest, key):
+        traced.append(len(points))
+        return estimate_sample(model, points, *rest, key=key)
+
+    monkeypatch.setattr(module, "_estimate_sample", jax.jit(whole))
     estimator = PoseEstimator(trained)
     for count in (40, 130, 250, 99):
         answer = estimator.estimate(mug.points[:count], key=KEY)
