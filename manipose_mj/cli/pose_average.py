@@ -18,8 +18,8 @@ def average_weights(
 ) -> int:
     """Average the weights of trainings that started from the same ones, or from one another.
 
-    On objects unlike those of either, the average often does better than both. Everything else in the file
-    is the first one's.
+    On objects unlike those of either, the average can do better than both. Everything else in the file is
+    the first one's.
 
     Args:
       files: Two or more, of one kind and of the same sizes.
@@ -41,6 +41,9 @@ def average_weights(
                 f"{path}: weights of {other.method}, {', '.join(other.categories)}, {other.labels} labels; "
                 f"expected {first.method}, {', '.join(first.categories)}, {first.labels} as {files[0]} has"
             )
-    model = mean_weights([first.model, *(other.model for other in others)])
+    try:
+        model = mean_weights([first.model, *(other.model for other in others)])
+    except InputError as error:
+        raise InputError(f"{', '.join(map(str, files))}: {error}") from None
     save_weights(out, replace(first, model=model))
     return 0

@@ -59,6 +59,8 @@ def train_pose(
     """
     one_thread_per_process()
     require_positive(minutes, views=views, batch=batch, steps=steps)
+    if not setting:
+        raise InputError("--setting names none; expected at least one, such as training")
     from manipose_mj.cli import output
     from manipose_mj.cli.pose_clouds import PoseClouds
     from manipose_mj.ppf_jax.curve_picture import draw_curve

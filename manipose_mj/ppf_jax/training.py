@@ -156,7 +156,7 @@ def with_weights_of(model: Any, other: Any) -> Any:
     """
     mine, theirs = jax.tree.leaves(model), jax.tree.leaves(other)
     if [np.shape(leaf) for leaf in mine] != [np.shape(leaf) for leaf in theirs]:
-        raise InputError("the weights are of a model of other sizes; train anew")
+        raise InputError("the weights are of models of other sizes; train anew")
     leaves = [jnp.asarray(new, old.dtype) for old, new in zip(mine, theirs, strict=True)]
     return jax.tree.unflatten(jax.tree.structure(model), leaves)
 

@@ -32,6 +32,7 @@ CUP, BOWL = (
         (["pose", "train", "mug", "--leave-out", "mug"], "leaves nothing of mug"),
         (["pose", "train", "axial", "--leave-out", "mug"], "unknown category of axial 'mug'"),
         (["pose", "train", "mug", "--setting", "anywere"], "did you mean anywhere"),
+        (["pose", "train", "mug", "--setting"], "--setting names none"),
         (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),
         (["pose", "average", "a.npz", "--out", "b.npz"], "1 files of weights"),
         (["pose", "average", CUP, "none.npz", "--out", "b.npz"], "none.npz: no such file"),
