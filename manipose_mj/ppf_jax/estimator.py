@@ -130,9 +130,11 @@ class PoseEstimator:
         # Only where one looks: normals take longer than all else outside the networks.
         looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
         rows = looked_at[looked_at < len(points)]
-        normals = cloud_normals(points, rows) if normals is None else normals[rows]
-        sample = _padded(points[rows], normals, len(looked_at))
-        return _as_estimate(_estimate_sample(model, *sample, key=key))
+        first = rows[: model.config.points]
+        normals = cloud_normals(points, first) if normals is None else normals[first]
+        kept, mask = _filled(points[rows], model.config.sample)
+        normals, _ = _filled(normals, model.config.points)
+        return _as_estimate(_estimate_sample(model, kept, normals, mask, key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -206,8 +208,13 @@ def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray
 def _padded(
     points: np.ndarray, normals: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    room = ((0, size - len(points)), (0, 0))
-    return np.pad(points, room), np.pad(normals, room), np.arange(size) < len(points)
+    filled, mask = _filled(points, size)
+    return filled, _filled(normals, size)[0], mask
+
+
+def _filled(rows: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of zeros after these, up to `size`; and which are not."""
+    return np.pad(rows, ((0, size - len(rows)), (0, 0))), np.arange(size) < len(rows)
 
 
 def _row(found: Estimates, index: int) -> Estimates:

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 PAIR_FEATURES = 10
 _TINY = 1e-8
-_STRAY = 5.0  # times the median distance from the middle; a hammer's ends are at 2.5
+STRAY = 5.0  # times the median distance from the middle; a hammer's ends are at 2.5
 
 
 class Cloud(eqx.Module):
@@ -168,7 +168,7 @@ def _without_strays(
     centre, near = _mean(points, mask), mask
     for _ in range(2):  # the first middle is off by what the strays weigh
         offsets = jnp.linalg.norm(points - centre, axis=-1)
-        near = mask & (offsets < _STRAY * _median_distance(points, mask, centre) + _TINY)
+        near = mask & (offsets < STRAY * _median_distance(points, mask, centre) + _TINY)
         centre = _mean(points, near)
     order = jnp.argsort(~near, stable=True)
     return points[order], normals[order], near[order]
@@ -183,8 +183,13 @@ def _median_distance(
     points: Float[Array, "n 3"], mask: Bool[Array, "n"], centre: Float[Array, "3"]
 ) -> Float[Array, ""]:
     """Of the points from `centre`."""
-    distances = jnp.sort(jnp.where(mask, jnp.linalg.norm(points - centre, axis=-1), jnp.inf))
-    return distances[(jnp.maximum(jnp.sum(mask), 1) - 1) // 2]
+    return masked_median(jnp.linalg.norm(points - centre, axis=-1), mask)
+
+
+def masked_median(values: Float[Array, "n"], mask: Bool[Array, "n"]) -> Float[Array, ""]:
+    """The lower median of those that count; infinite where none do."""
+    ordered = jnp.sort(jnp.where(mask, values, jnp.inf))
+    return ordered[(jnp.maximum(jnp.sum(mask), 1) - 1) // 2]
 
 
 def _unit(vectors: Float[Array, "*b 3"]) -> Float[Array, "*b 3"]:

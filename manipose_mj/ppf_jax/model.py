@@ -13,7 +13,14 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.clouds import SAMPLE_POINTS
-from manipose_mj.ppf_jax.features import Cloud, normalised, random_pairs, sampled, sampled_rows
+from manipose_mj.ppf_jax.features import (
+    STRAY,
+    Cloud,
+    normalised,
+    random_pairs,
+    sampled,
+    sampled_rows,
+)
 from manipose_mj.ppf_jax.network import NetworkConfig, PairVotes, VotingNetwork
 from manipose_mj.ppf_jax.refinement import (
     CONFIDENT_LEVEL,
@@ -26,6 +33,7 @@ from manipose_mj.ppf_jax.refinement import (
     free_space,
 )
 from manipose_mj.ppf_jax.relatives import relatives
+from manipose_mj.ppf_jax.revolution import RevolutionConfig, settled
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import Hypotheses, VotingConfig, agreement, vote
 
@@ -39,16 +47,23 @@ class ModelConfig:
       network: The voting network's sizes.
       voting: How votes are counted.
       refinement: The refiner's sizes and steps.
+      revolution: How an axis of revolution is settled in the end.
       pairs: Votes at inference.
-      points: Points of the sample that is looked at.
+      points: Points of the sample that the networks look at.
     """
 
     symmetry: CommonSymmetry = CommonSymmetry()
     network: NetworkConfig = field(default_factory=NetworkConfig)
     voting: VotingConfig = field(default_factory=VotingConfig)
     refinement: RefinementConfig = field(default_factory=RefinementConfig)
+    revolution: RevolutionConfig = field(default_factory=RevolutionConfig)
     pairs: int = 4096
     points: int = SAMPLE_POINTS
+
+    @property
+    def sample(self) -> int:
+        """Points of a cloud that are of any use; those that the networks look at come first."""
+        return max(self.points, self.revolution.points) if self.symmetry.axial else self.points
 
 
 class EstimatingModel(Protocol):
@@ -94,16 +109,17 @@ class PoseModel(eqx.Module):
         return estimate_cloud(self, points, normals, mask, key=key)
 
     def looks_at(self, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "sample"]:
-        """The rows of a cloud that `estimate` looks at: the rest needs no normals."""
+        """The rows of a cloud that `estimate` looks at; only the first `config.points` need normals."""
         sample_key = jax.random.split(key, 3)[0]
-        return sampled_rows(mask, count=self.config.points, key=sample_key)
+        return sampled_rows(mask, count=self.config.sample, key=sample_key)
 
 
 class Estimates(eqx.Module):
     """Ranked answers for one cloud.
 
     Attributes:
-      poses: `(h, 4, 4)`, `T_camera_label`, the likeliest first.
+      poses: `(h, 4, 4)`, `T_camera_label`, the likeliest first; if X is an axis of revolution, that one
+        is settled by positions alone (`revolution.py`).
       extents: `(h, 3)` [m].
       confidence: `(h,)`, probability of being within 15 deg and 2 cm.
       voted: `(h, 4, 4)`, the poses before refinement, in the same order.
@@ -172,22 +188,24 @@ def estimate_cloud(
       key: Draws the sample, the pairs and the free space.
     """
     sample_key = jax.random.split(key, 3)[0]
-    sample = sampled(points, normals, mask, count=model.config.points, key=sample_key)
-    return estimate_sample(model, *sample, key=key)
+    points, normals, mask = sampled(
+        points, normals, mask, count=model.config.sample, key=sample_key
+    )
+    return estimate_sample(model, points, normals[: model.config.points], mask, key=key)
 
 
 def estimate_sample(
     model: PoseModel,
     points: Float[Array, "sample 3"],
-    normals: Float[Array, "sample 3"],
+    normals: Float[Array, "seen 3"],
     mask: Bool[Array, "sample"],
     *,
     key: PRNGKeyArray,
 ) -> Estimates:
-    """`estimate_cloud` of the rows of a cloud that `PoseModel.looks_at` names, in their order."""
+    """`estimate_cloud` of the rows that `PoseModel.looks_at` names, with normals of the first of them."""
     config = model.config
     _, pair_key, free_key = jax.random.split(key, 3)
-    cloud = normalised(points, normals, mask)
+    cloud = normalised(points[: len(normals)], normals, mask[: len(normals)])
     votes, log_extents = cast_votes(model, cloud, config.pairs, key=pair_key)
     first = faced(vote(votes, config.symmetry, config.voting), cloud, config.symmetry)
     free = free_space(cloud, config.refinement, key=free_key)
@@ -214,8 +232,11 @@ def estimate_sample(
     extents = jnp.where(jnp.isfinite(extents), extents, cloud.scale)
     likely = jnp.where(sound[:, None], likely, 0.0)
     order = jnp.argsort(jnp.where(sound, off, jnp.inf))
+    poses = poses[order]
+    if config.symmetry.axial:
+        poses = poses.at[0].set(_settled(poses[0], points, mask, cloud, config.revolution))
     return Estimates(
-        poses=poses[order],
+        poses=poses,
         extents=extents[order],
         confidence=likely[order, CONFIDENT_LEVEL],
         voted=metric_poses(first, cloud)[order],
@@ -287,6 +308,30 @@ def cast_votes(
     first, second = random_pairs(cloud, pairs, key=key)
     votes = model.network.pairs(cloud, known, context, first, second)
     return votes, model.network.extents(context)
+
+
+def _settled(
+    pose: Float[Array, "4 4"],
+    points: Float[Array, "sample 3"],
+    mask: Bool[Array, "sample"],
+    cloud: Cloud,
+    config: RevolutionConfig,
+) -> Float[Array, "4 4"]:
+    """`settled` in metres and the camera's frame."""
+    within = (points - cloud.centre) / cloud.scale
+    views = -points / jnp.maximum(jnp.linalg.norm(points, axis=1, keepdims=True), 1e-6)
+    origin = (pose[:3, 3] - cloud.centre) / cloud.scale
+    known = mask & (jnp.linalg.norm(within, axis=1) < STRAY)
+    rotation, origin = settled(
+        jnp.where(known[:, None], within, 0.0),
+        views,
+        known,
+        pose[:3, :3],
+        origin,
+        config.noise / cloud.scale,
+        config,
+    )
+    return compose(rotation, origin * cloud.scale + cloud.centre)
 
 
 def first_votes(votes: PairVotes, count: int) -> PairVotes:

@@ -29,6 +29,7 @@ from manipose_mj.ppf_jax.network import NetworkConfig
 from manipose_mj.ppf_jax.part_network import PartNetworkConfig
 from manipose_mj.ppf_jax.part_voting import PartVotingConfig
 from manipose_mj.ppf_jax.refinement import RefinementConfig
+from manipose_mj.ppf_jax.revolution import RevolutionConfig
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.voting import VotingConfig
 
@@ -143,6 +144,7 @@ def _model_config(stored: dict[str, Any]) -> ModelConfig:
         network=NetworkConfig(**stored["network"]),
         voting=VotingConfig(**stored["voting"]),
         refinement=RefinementConfig(**_tuples(stored["refinement"])),
+        revolution=RevolutionConfig(**_known(RevolutionConfig, stored.get("revolution", {}))),
         pairs=stored["pairs"],
         points=stored["points"],
     )

@@ -30,7 +30,7 @@ def test_a_category_without_weights_gets_its_type_s():
 @pytest.mark.parametrize(
     ("name", "category", "cm", "deg"),
     [
-        ("axial", "cup", 0.08, 0.56),
+        ("axial", "cup", 0.08, 0.36),
         ("mirror", "steel_tape", 0.20, 1.67),
         ("functional", "squeegee", 0.21, 1.05),
     ],
