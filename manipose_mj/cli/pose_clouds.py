@@ -10,6 +10,7 @@ from manipose_mj.cli import output
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.clouds import LabelledCloud
 from manipose_mj.ppf_jax.evaluation import categories_of
+from manipose_mj.ppf_jax.grafted_clouds import grafted_clouds
 from manipose_mj.ppf_jax.source_frames import SourceLabel, with_source_frames
 from manipose_mj.ppf_jax.view_cache import catalogue_clouds, source_labels
 from manipose_mj.ppf_jax.view_settings import view_setting
@@ -70,6 +71,28 @@ class PoseClouds:
         if self._labels == "original":
             return with_source_frames(clouds, self.sources(clouds))
         return clouds
+
+    def grafted(self, count: int, setting: str) -> list[LabelledCloud]:
+        """Views of objects that are made of two training objects each.
+
+        Raises:
+          InputError: They are wanted with the sources' labels, which they have none of; or of fewer
+            than two categories, or in a setting that needs a table.
+        """
+        if not count:
+            return []
+        if self._labels == "original":
+            raise InputError(
+                "--grafts makes objects that no source has; leave out --labels original"
+            )
+        with output.Progress("grafted objects rendered") as progress:
+            return grafted_clouds(
+                self.categories,
+                count,
+                view_setting(setting),
+                jobs=self._jobs,
+                progress=progress.update,
+            )
 
     def sources(self, clouds: Sequence[LabelledCloud]) -> dict[str, SourceLabel]:
         """The sources' labels of the objects that clouds show."""

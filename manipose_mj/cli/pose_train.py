@@ -27,6 +27,7 @@ def train_pose(
     labels: Literal["unified", "original"] = "unified",
     setting: Annotated[tuple[str, ...], arg(metavar="NAME...")] = ("training",),
     views: int = 256,
+    grafts: int = 0,
     batch: int = 64,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -50,6 +51,7 @@ def train_pose(
       labels: The unified labels, or those of the sources that the objects are assigned to.
       setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
       views: Of each object in each setting.
+      grafts: Of a type, so many objects besides that are made of two of different categories, 32 views each.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -59,6 +61,8 @@ def train_pose(
     """
     one_thread_per_process()
     require_positive(minutes, views=views, batch=batch, steps=steps)
+    if grafts < 0:
+        raise InputError(f"--grafts is {grafts}; expected 0 or more")
     if not setting:
         raise InputError("--setting names none; expected at least one, such as training")
     from manipose_mj.cli import output
@@ -71,6 +75,7 @@ def train_pose(
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
+    clouds += source.grafted(grafts, "training")
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)

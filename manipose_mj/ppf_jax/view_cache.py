@@ -22,8 +22,7 @@ from asset_pipeline.catalogue import CATALOGUE, Split, instances
 from asset_pipeline.source_hash import source_hash
 from asset_pipeline.stable_poses import stable_poses
 from manipose_mj.errors import InputError
-from manipose_mj.poses import SymmetryGroup
-from manipose_mj.ppf_jax.cache_file import new_cache_file
+from manipose_mj.ppf_jax.cloud_files import read_clouds, write_clouds
 from manipose_mj.ppf_jax.clouds import (
     SAMPLE_POINTS,
     CloudBatch,
@@ -186,7 +185,7 @@ def _fill(category: str, index: int, setting: ViewSetting, views: int) -> int:
     if missing:
         name, resting = CATALOGUE[category].instance(index), setting.placement != "anywhere"
         subject = catalogue_subject(category, index, resting=resting)
-        occluders = _catalogue_occluders(name) if setting.occluded else []
+        occluders = catalogue_occluders(name) if setting.occluded else []
         for number in missing:
             # Not the setting: the tables' settings show the same objects in the same random order.
             seed = [zlib.crc32(name.encode()), number]
@@ -198,11 +197,11 @@ def _fill(category: str, index: int, setting: ViewSetting, views: int) -> int:
             clouds = render_clouds(
                 subject, setting, VIEWS_PER_FILE, rng, occluders=occluders, first=first
             )
-            _write(files[number], clouds)
+            write_clouds(files[number], clouds)
     return index
 
 
-def _catalogue_occluders(name: str) -> list[Occluder]:
+def catalogue_occluders(name: str) -> list[Occluder]:
     """Typical objects of other categories, for one object always the same ones."""
     rng = np.random.default_rng(zlib.crc32(name.encode()))
     rigid = [row for row in CATALOGUE.values() if row.object_type != "articulated"]
@@ -210,38 +209,8 @@ def _catalogue_occluders(name: str) -> list[Occluder]:
     return [Occluder.of_mesh(rigid[i].generate(0).bodies[0].surface()) for i in chosen]
 
 
-def _write(path: Path, clouds: Sequence[LabelledCloud]) -> None:
-    group = clouds[0].symmetry
-    with new_cache_file(path) as scratch:
-        np.savez(
-            scratch,
-            points=np.concatenate([cloud.points for cloud in clouds]),
-            normals=np.concatenate([cloud.normals for cloud in clouds]),
-            starts=np.cumsum([0, *(len(cloud) for cloud in clouds)]),
-            pose=np.stack([cloud.pose for cloud in clouds]),
-            extents=clouds[0].extents,
-            rotations=group.rotations,
-            axial=group.axial,
-        )
-
-
 def _read(category: str, index: int, setting: ViewSetting, views: int) -> list[LabelledCloud]:
     name, clouds = CATALOGUE[category].instance(index), []
     for path in _files(category, index, setting, views):
-        with np.load(path) as stored:
-            arrays = dict(stored)
-        group = SymmetryGroup(arrays["rotations"], bool(arrays["axial"]))
-        for i, pose in enumerate(arrays["pose"]):
-            rows = slice(arrays["starts"][i], arrays["starts"][i + 1])
-            clouds.append(
-                LabelledCloud(
-                    points=arrays["points"][rows],
-                    normals=arrays["normals"][rows],
-                    pose=pose,
-                    extents=arrays["extents"],
-                    symmetry=group,
-                    name=f"{name}/{len(clouds)}",
-                    category=category,
-                )
-            )
+        clouds += read_clouds(path, name, category, first=len(clouds))
     return clouds[:views]
