@@ -40,6 +40,8 @@ class HandleFitConfig:
       snap_level: Most that a level one is: below a flap a plinth often goes on in its plane.
       notch: Share of the points around it with which a strip of the door's plane is taken for a gap
         between two doors. Where there is none up to the plane's end, the hinge is not before it.
+      deepest: How far behind the front beside it a hinge may be [m]: half of what the thickest doors have,
+        for no view of a shut door tells where in it the hinge is.
     """
 
     reaches: tuple[float, ...] = (0.07, 0.15, 0.45)
@@ -56,6 +58,7 @@ class HandleFitConfig:
     snap: float = 0.10
     snap_level: float = 0.02
     notch: float = 0.6
+    deepest: float = 0.018
 
 
 class Joint(eqx.Module):
@@ -80,6 +83,10 @@ _HIGHEST, _LOWEST = -0.004, -0.08  # of panels, from the handle's centre [m]
 # Half of the part of a panel that is looked at, along and across the handle [m].
 _AROUND = (0.10, 0.08)
 _USUAL = -0.03  # height of a panel that does not show [m]
+_TELLING = 20  # points of a plane, at least
+# Where the front beside a hinge is looked at: from it towards the handle, and before and behind it [m].
+_BESIDE = (0.005, 0.06)
+_AT_HINGE = 0.10
 _NOISE = 0.004  # of points across a handle [m]
 _FARTHEST = 1.5  # edge of a door [m]
 _DOOR_LEAST = 2  # points of a door in a bin: fewer are strays
@@ -117,6 +124,7 @@ def fitted(
     origin = jnp.where(turns, origin, handle[:3, 3])
     most = jnp.where(jnp.abs(axis @ up) > _UPRIGHT, config.snap, config.snap_level)
     moved = _fitted_hinge(points, mask, handle, panel, origin, axis, most, config)
+    moved = _near_front(points, mask, handle, moved, axis, config)
     return Joint(handle, joint.hinge, jnp.where(turns, moved, origin), axis)
 
 
@@ -172,14 +180,41 @@ def _fitted_hinge(
     return origin + jnp.where(near & (reach > 0), by, 0.0) * across
 
 
+def _near_front(
+    points: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    handle: Float[Array, "4 4"],
+    origin: Float[Array, "3"],
+    axis: Float[Array, "3"],
+    config: HandleFitConfig,
+) -> Float[Array, "3"]:
+    """A point of the hinge, brought forward to where it is `config.deepest` behind the front beside it."""
+    centre, out = handle[:3, 3], handle[:3, 1]
+    towards = unit(jnp.cross(axis, out))
+    towards *= jnp.where((centre - origin) @ towards < 0, -1.0, 1.0)
+    offset = points - origin
+    beside = offset @ towards
+    front = mask & (beside > _BESIDE[0]) & (beside < _BESIDE[1])
+    front &= jnp.abs((points - centre) @ axis) < config.strip
+    height = _densest(offset @ out, front, (-_AT_HINGE, _AT_HINGE), -_AT_HINGE)
+    return origin + jnp.maximum(height - config.deepest, 0.0) * out
+
+
 def _panel_height(own: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, ""]:
     """Where most of the points behind a handle are, from its centre outwards [m]."""
     behind = mask & (jnp.abs(own[:, 0]) < _AROUND[0]) & (jnp.abs(own[:, 2]) < _AROUND[1])
-    behind &= (own[:, 1] < _HIGHEST) & (own[:, 1] > _LOWEST)
-    counts = binned_counts(own[:, 1], behind, (_LOWEST, _HIGHEST), _PANEL_BIN)
+    return _densest(own[:, 1], behind, (_LOWEST, _HIGHEST), _USUAL)
+
+
+def _densest(
+    heights: Float[Array, "n"], on: Bool[Array, "n"], span: tuple[float, float], usual: float
+) -> Float[Array, ""]:
+    """Where most of these points are [m]; `usual` where too few are within the span to tell."""
+    on &= (heights > span[0]) & (heights < span[1])
+    counts = binned_counts(heights, on, span, _PANEL_BIN)
     counts = jnp.convolve(counts, jnp.ones(3), mode="same")
-    height = _LOWEST + (jnp.argmax(counts) + 0.5) * _PANEL_BIN
-    return jnp.where(jnp.sum(behind) < 20, _USUAL, height)
+    height = span[0] + (jnp.argmax(counts) + 0.5) * _PANEL_BIN
+    return jnp.where(jnp.sum(on) < _TELLING, usual, height)
 
 
 def _end(

@@ -41,11 +41,11 @@ def _door(length, rng, gap=None):
     return points @ _POSE[:3, :3].T + _POSE[:3, 3]
 
 
-def _voted(offset, turn, hinge_at, hinge=0.97):
-    """A joint as votes might have it: moved in the door's frame, and turned about its normal."""
+def _voted(offset, turn, hinge_at, hinge=0.97, depth=0.0):
+    """A joint as votes might have it: moved in the door's frame, and turned about its normal; hinged behind it."""
     local = compose(rotation_about(np.array([0.0, 1.0, 0.0]), turn), np.asarray(offset, float))
     handle = _POSE @ local
-    origin = handle @ [0.0, -_HEIGHT, hinge_at, 1.0]
+    origin = handle @ [0.0, -_HEIGHT - depth, hinge_at, 1.0]
     values = handle, hinge, origin[:3], handle[:3, 0]
     return Joint(*(jnp.asarray(value, jnp.float32) for value in values))
 
@@ -112,6 +112,15 @@ def test_a_level_hinge_moves_less_for_what_goes_on_may_be_a_plinth():
         joint = _voted([0.0, 0.0, 0.0], 0.0, voted)
         assert _across(_fit(points, joint)) == pytest.approx(upright, abs=0.008)
         assert _across(_fit(points, joint, sideways)) == pytest.approx(level, abs=0.008)
+
+
+def test_a_hinge_is_not_deeper_than_a_door_may_be_thick():
+    points = _door(0.2, np.random.default_rng(6))
+    for voted, kept in ((0.06, 0.018), (0.03, 0.018), (0.012, 0.012), (-0.01, -0.01)):
+        found = _fit(points, _voted([0.0, 0.0, 0.0], 0.0, 0.375, depth=voted))
+        depth = -((found.origin - found.handle[:3, 3]) @ found.handle[:3, 1]) - _HEIGHT
+        assert depth == pytest.approx(kept, abs=0.004)
+        assert _across(found) == pytest.approx(_HINGE, abs=0.008)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.1, 0.03])
