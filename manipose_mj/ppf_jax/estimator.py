@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.poses import SymmetryGroup, pose_error
 from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
@@ -31,6 +32,7 @@ from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
+_SAME = (0.02, np.deg2rad(15.0))  # what confidence is about [m, rad]
 _LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
 
 
@@ -42,7 +44,8 @@ class PoseEstimate:
       pose: `(4, 4)`, `T_camera_label` [m].
       extents: `(3,)` [m], lengths of the bounding box along the label's axes.
       confidence: Probability that the pose is within 15 deg and 2 cm.
-      hypotheses: The other candidates, likeliest first; none has hypotheses of its own.
+      hypotheses: The other candidates, likeliest first; but those that are within 15 deg and 2 cm of a likelier
+        one come after all others. None has hypotheses of its own.
     """
 
     pose: Float[np.ndarray, "4 4"]
@@ -124,9 +127,11 @@ class PoseEstimator:
         """
         points, normals = _checked(cloud, key)
         size, model = bucket(len(points)), self.trained.model
+        axial = model.config.symmetry.axial
         if not isinstance(model, PoseModel):
             normals = cloud_normals(points) if normals is None else normals
-            return _as_estimate(_estimate(model, *_padded(points, normals, size), key=key))
+            found = _estimate(model, *_padded(points, normals, size), key=key)
+            return _as_estimate(found, axial)
         # Only where one looks: normals take longer than all else outside the networks.
         looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
         rows = looked_at[looked_at < len(points)]
@@ -134,7 +139,7 @@ class PoseEstimator:
         normals = cloud_normals(points, first) if normals is None else normals[first]
         kept, mask = _filled(points[rows], model.config.sample)
         normals, _ = _filled(normals, model.config.points)
-        return _as_estimate(_estimate_sample(model, kept, normals, mask, key=key))
+        return _as_estimate(_estimate_sample(model, kept, normals, mask, key=key), axial)
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -157,7 +162,8 @@ class PoseEstimator:
         rows = [_padded(points, normals, size) for points, normals in checked]
         columns = (jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True))
         found = jax.tree.map(np.asarray, estimate_batch(self.trained.model, *columns, key=key))
-        return [_as_estimate(_row(found, i)) for i in range(len(rows))]
+        axial = self.trained.model.config.symmetry.axial
+        return [_as_estimate(_row(found, i), axial) for i in range(len(rows))]
 
 
 def bucket(count: int) -> int:
@@ -221,12 +227,27 @@ def _row(found: Estimates, index: int) -> Estimates:
     return jax.tree.map(lambda leaf: leaf[index], found)
 
 
-def _as_estimate(found: Estimates) -> PoseEstimate:
+def _as_estimate(found: Estimates, axial: bool) -> PoseEstimate:
     poses, extents, confidence = (
         np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
     )
     each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
-    return PoseEstimate(each[0].pose, each[0].extents, each[0].confidence, tuple(each[1:]))
+    order = _distinct_first(poses, axial)
+    first = each[0]
+    others = tuple(each[i] for i in order[1:])
+    return PoseEstimate(first.pose, first.extents, first.confidence, others)
+
+
+def _distinct_first(poses: Float[np.ndarray, "h 4 4"], axial: bool) -> list[int]:
+    """Rows in their order, but after all others those that are near one before them."""
+    group = SymmetryGroup.about_x() if axial else SymmetryGroup.identity()
+    shift, turn = pose_error(poses[:, None].astype(float), poses[None].astype(float), group)
+    near = (shift < _SAME[0]) & (turn < _SAME[1])
+    distinct: list[int] = []
+    for row in range(len(poses)):
+        if not near[row, distinct].any():
+            distinct.append(row)
+    return distinct + [row for row in range(len(poses)) if row not in distinct]
 
 
 @lru_cache

@@ -10,6 +10,7 @@ import pytest
 from half_visible import half_visible_clouds
 
 from manipose_mj.errors import InputError
+from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.model import ModelConfig, PoseModel, estimate_sample
@@ -71,6 +72,21 @@ def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
     assert len(first.hypotheses) + 1 == 4 + len(relatives(CONFIG.symmetry))
     assert not first.hypotheses[0].hypotheses
     assert 0 <= first.confidence <= 1 and np.all(first.extents > 0)
+
+
+def test_other_hypotheses_come_before_what_is_nearly_said_already():
+    def upside_down(degrees):
+        return compose(
+            rotation_about(np.array([0.0, 1.0, 0.0]), np.radians(degrees)), np.array([0, 0, 0.5])
+        )
+
+    poses = np.stack([upside_down(d) for d in (0, 4, 181, 10, 90, 178)]).astype(np.float32)
+    assert module._distinct_first(poses, axial=True) == [0, 2, 4, 1, 3, 5]
+    spun = compose(rotation_about(np.array([1.0, 0.0, 0.0]), 1.0), np.array([0, 0, 0.5]))
+    moved = compose(np.eye(3), np.array([0, 0.03, 0.5]))
+    poses = np.stack([upside_down(0), spun, moved]).astype(np.float32)
+    assert module._distinct_first(poses, axial=True) == [0, 2, 1]
+    assert module._distinct_first(poses, axial=False) == [0, 1, 2]
 
 
 def test_stray_points_and_bad_normals_give_no_nan(trained, mug):
