@@ -31,6 +31,7 @@ from jaxtyping import Float
 from pose_matchers import available, template
 from scipy.spatial.transform import Rotation
 
+from manipose_mj.cli.process import compile_at_once_on_gpus
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.ppf_jax.cloud_normals import cloud_normals
@@ -179,6 +180,7 @@ def _with_pairs(model: PoseModel, pairs: int) -> PoseModel:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures; returns the exit code."""
+    compile_at_once_on_gpus()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from manipose_mj.cli.pose_train import Name
-from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.cli.process import CORES, compile_at_once_on_gpus, one_thread_per_process
 from manipose_mj.errors import InputError
 
 KEPT = 0.8  # share of the views that the estimator is surest of
@@ -45,6 +45,7 @@ def evaluate_pose(
       json: Print JSON, for other programs.
     """
     one_thread_per_process()
+    compile_at_once_on_gpus()
     if views < 1:
         raise InputError(f"--views is {views}; expected at least 1")
     import numpy as np

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.cli.process import CORES, compile_at_once_on_gpus, one_thread_per_process
 from manipose_mj.errors import InputError
 
 WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
@@ -60,6 +60,7 @@ def train_pose(
       jobs: Processes that render.
     """
     one_thread_per_process()
+    compile_at_once_on_gpus()
     require_positive(minutes, views=views, batch=batch, steps=steps)
     if grafts < 0:
         raise InputError(f"--grafts is {grafts}; expected 0 or more")
