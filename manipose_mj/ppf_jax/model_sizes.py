@@ -20,8 +20,13 @@ def model_config(clouds: Sequence[LabelledCloud]) -> ModelConfig:
     """
     symmetry = common_symmetry(cloud.symmetry for cloud in clouds)
     if len({cloud.category for cloud in clouds}) == 1:
-        return ModelConfig(symmetry=symmetry)
+        return ModelConfig(symmetry=symmetry, pairs=pairs_for(symmetry))
     return type_config(symmetry)
+
+
+def pairs_for(symmetry: CommonSymmetry) -> int:
+    """Votes for one axis need be half as many as those for a frame."""
+    return ModelConfig.pairs // 2 if symmetry.axial else ModelConfig.pairs
 
 
 def type_config(symmetry: CommonSymmetry) -> ModelConfig:
@@ -35,5 +40,6 @@ def type_config(symmetry: CommonSymmetry) -> ModelConfig:
         network=NetworkConfig(local_width=48, width=96, pair_width=96, lines=True),
         voting=VotingConfig(axes_kept=6),
         refinement=RefinementConfig(widths=(96, 192), hidden=192),
+        pairs=pairs_for(symmetry),
         points=384,
     )

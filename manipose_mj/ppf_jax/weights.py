@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from asset_pipeline.staging import staging
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
 from manipose_mj.ppf_jax.close_look import CloseLook
@@ -119,23 +120,13 @@ def load_weights(path: Path) -> TrainedModel:
     return TrainedModel(model, categories, labels)
 
 
-class replacing:  # noqa: N801
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
     """A scratch path that takes the place of `path` at once when all went well."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self) -> Path:
-        handle, name = tempfile.mkstemp(dir=self._path.parent, prefix=f".{self._path.name}-")
-        os.close(handle)
-        self._scratch = Path(name)
-        return self._scratch
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None:
-            os.replace(self._scratch, self._path)
-        else:
-            self._scratch.unlink(missing_ok=True)
+    with staging(path) as folder:
+        scratch = folder / path.name
+        yield scratch
+        os.replace(scratch, path)
 
 
 def _model_config(stored: dict[str, Any]) -> ModelConfig:
