@@ -51,7 +51,8 @@ def train_pose(
       labels: The unified labels, or those of the sources that the objects are assigned to.
       setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
       views: Of each object in each setting.
-      grafts: Of a type, so many objects besides that are made of two of different categories, 32 views each.
+      grafts: Of a type, so many objects besides that are made of two of different categories, 32 views
+        each in the setting training.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -75,8 +76,9 @@ def train_pose(
     from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
+    made_of_two = source.grafted(grafts, "training")
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
-    clouds += source.grafted(grafts, "training")
+    clouds += made_of_two
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)
