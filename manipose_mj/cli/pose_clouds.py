@@ -72,12 +72,12 @@ class PoseClouds:
             return with_source_frames(clouds, self.sources(clouds))
         return clouds
 
-    def grafted(self, count: int, setting: str) -> list[LabelledCloud]:
-        """Views of objects that are made of two training objects each.
+    def grafted(self, count: int) -> list[LabelledCloud]:
+        """Views of objects that are made of two training objects each, as training sees them.
 
         Raises:
           InputError: They are wanted with the sources' labels, which they have none of; or of fewer
-            than two categories, or in a setting that needs a table.
+            than two categories.
         """
         if not count:
             return []
@@ -89,7 +89,7 @@ class PoseClouds:
             return grafted_clouds(
                 self.categories,
                 count,
-                view_setting(setting),
+                view_setting("training"),
                 jobs=self._jobs,
                 progress=progress.update,
             )

@@ -76,7 +76,7 @@ def train_pose(
     from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
-    made_of_two = source.grafted(grafts, "training")
+    made_of_two = source.grafted(grafts)
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     clouds += made_of_two
     chosen = METHODS[method]

@@ -30,7 +30,7 @@ def compile_at_once_on_gpus() -> None:
     """Do without XLA's tuning of fusions on GPUs; no effect once JAX has begun to compile, nor where XLA_FLAGS says otherwise.
 
     On an H200 with JAX 0.11.2 it spent over five minutes on one reduction of the estimator; without it, the first step
-    of a training comes after one. The oldest and the newest JAX that this package takes know the flag.
+    of a training comes after one. JAX 0.10.2 and 0.11.2 know the flag.
     """
     flags = os.environ.get("XLA_FLAGS", "")
     if _FUSION_AUTOTUNER not in flags:

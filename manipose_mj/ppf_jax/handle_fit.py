@@ -40,7 +40,7 @@ class HandleFitConfig:
       snap_level: Most that a level one is: below a flap a plinth often goes on in its plane.
       notch: Share of the points around it with which a strip of the door's plane is taken for a gap
         between two doors. Where there is none up to the plane's end, the hinge is not before it.
-      deepest: How far behind the front beside it a hinge may be [m]: half of what the thickest doors have,
+      deepest: How far behind the front beside it a hinge may be [m]: half of what the deepest of the catalogue have,
         for no view of a shut door tells where in it the hinge is.
     """
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from manipose_mj.ppf_jax.features import masked_median
@@ -19,6 +20,7 @@ from manipose_mj.ppf_jax.rotations import from_vector
 _CAUCHY = 2.0  # residuals from which on points count less, in units of their spread
 _TO_SPREAD = 1.48  # a normal distribution's standard deviation in units of its median deviation
 _TINY = 1e-9
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]], np.float32)  # turn, of rows
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,6 @@ def _held_against_profile(
     )
     slope = across[:, :1] * (by_height - heights) + across[:, 1:] * (by_radius - radii)
     return jnp.sum(across * (profile - mean), axis=1), slope
-
-
-_QUARTER = jnp.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 def _line_normals(
