@@ -121,7 +121,7 @@ def _draw(
 
     wrong: dict[str, int] = {}
     for e in errors:
-        if not (e.handle_right and e.joint_right):
+        if not e.all_right:
             name = e.name.split(" ")[0]
             wrong[name] = wrong.get(name, 0) + 1
     chosen = sorted(wrong, key=lambda name: -wrong[name])[:8]
@@ -143,7 +143,7 @@ def _draw(
             colours = ("tab:red", "tab:green", "tab:cyan")
             hinge = part.joint == "hinge"
             _lines(plot, part.handle, part.axis_origin, part.axis, hinge, colours)
-        right = sum(e.handle_right and e.joint_right for e in own)
+        right = sum(e.all_right for e in own)
         plot.set_title(f"{name}: {right} of {len(own)} right")
         plot.set_aspect("equal")
     figure.tight_layout()

@@ -170,6 +170,7 @@ def evaluate_articulated(
         "handle": "handle_right",
         "joint": "joint_right",
         "all": "all_right",
+        "objects": "objects_right",
     }
     medians = {
         "cm": "centre_cm_median",

@@ -60,6 +60,11 @@ class PartErrors:
         """Whether type, direction and line are."""
         return self.type_right and self.direction <= ANGLE_BAR and self.line <= LINE_BAR
 
+    @property
+    def all_right(self) -> bool:
+        """Whether handle and joint are."""
+        return self.handle_right and self.joint_right
+
 
 def part_errors(
     cloud: FurnitureCloud, estimates: Sequence[PartEstimate], *, least_pixels: int = VISIBLE_PIXELS
@@ -117,6 +122,8 @@ def part_errors(
 def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str, float | int]:
     """Figures of a table's row: cm, degrees, shares from 0 to 1; of joints, those whose axis is visible.
 
+    An object is right if more than half of its parts that show, over all of its scenes, are.
+
     Args:
       errors: Of all parts that show.
       strange: Estimates of no handle at all.
@@ -137,6 +144,9 @@ def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str
     hinges = [e for e in errors if e.hinge and e.axis_visible]
     joints = [e for e in errors if e.axis_visible]
     slides = [e for e in errors if not e.hinge]
+    by_object: dict[str, list[bool]] = {}
+    for e in joints:
+        by_object.setdefault(e.name.split("/")[0], []).append(e.all_right)
     return {
         "n": len(errors),
         "found": share([np.isfinite(e.centre) for e in errors]),
@@ -147,7 +157,8 @@ def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str
         "line_within": share([e.line <= LINE_BAR for e in hinges]),
         "handle_right": share([e.handle_right for e in errors]),
         "joint_right": share([e.joint_right for e in joints]),
-        "all_right": share([e.handle_right and e.joint_right for e in joints]),
+        "all_right": share([e.all_right for e in joints]),
+        "objects_right": share([np.mean(each) > 0.5 for each in by_object.values()]),
         "centre_cm_median": 100 * median([e.centre for e in errors]),
         "axes_deg_median": float(np.degrees(median([e.axes for e in errors]))),
         "direction_deg_median": float(np.degrees(median([e.direction for e in errors]))),

@@ -29,7 +29,7 @@ from manipose_mj.ppf_jax.articulated_clouds import (
 )
 from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, PartEstimate
 from manipose_mj.ppf_jax.articulated_losses import ArticulatedLoss, varied
-from manipose_mj.ppf_jax.articulated_metrics import part_errors, summary
+from manipose_mj.ppf_jax.articulated_metrics import PartErrors, part_errors, summary
 from manipose_mj.ppf_jax.articulated_model import ArticulatedConfig, ArticulatedModel
 from manipose_mj.ppf_jax.articulated_subject import catalogue_furniture
 from manipose_mj.ppf_jax.articulated_views import FurnitureSetting, render_furniture
@@ -291,6 +291,17 @@ def test_errors_are_what_estimates_are_off_by(scene):
     assert 0.001 < errors[-1].line <= 0.03 + 1e-6
     errors, strange = part_errors(cloud, [], least_pixels=0)
     assert strange == 0 and summary(errors, strange, 1)["found"] == 0.0
+
+
+def test_an_object_is_right_if_most_of_its_parts_are():
+    right = PartErrors("", True, True, 0.0, 0.0, True, 0.0, 0.0, 0.0, 0.9)
+    wrong = dataclasses.replace(right, line=0.1)
+    names = {"a/0 door_0": right, "a/1 door_0": wrong, "a/2 door_0": right, "b/0 door_0": right}
+    errors = [dataclasses.replace(e, name=name) for name, e in names.items()]
+    errors.append(dataclasses.replace(wrong, name="b/1 door_0"))
+    # One whose axis does not show counts neither way.
+    errors.append(dataclasses.replace(right, name="b/2 door_0", axis_visible=False))
+    assert summary(errors, 0, 1)["objects_right"] == 0.5
 
 
 def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene, monkeypatch):
