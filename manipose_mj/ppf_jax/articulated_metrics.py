@@ -158,7 +158,7 @@ def summary(errors: Sequence[PartErrors], strange: int, clouds: int) -> dict[str
         "handle_right": share([e.handle_right for e in errors]),
         "joint_right": share([e.joint_right for e in joints]),
         "all_right": share([e.all_right for e in joints]),
-        "objects_right": share([np.mean(each) > 0.5 for each in by_object.values()]),
+        "objects_right": share([sum(each) > len(each) / 2 for each in by_object.values()]),
         "centre_cm_median": 100 * median([e.centre for e in errors]),
         "axes_deg_median": float(np.degrees(median([e.axes for e in errors]))),
         "direction_deg_median": float(np.degrees(median([e.direction for e in errors]))),

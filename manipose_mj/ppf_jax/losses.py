@@ -20,8 +20,8 @@ from manipose_mj.ppf_jax.model import (
     first_votes,
     joined,
     read,
-    refine,
     refine_related,
+    refine_voted,
 )
 from manipose_mj.ppf_jax.network import PAIR_OUTPUTS, PairVotes
 from manipose_mj.ppf_jax.refinement import LEVELS, Reading, faced, free_space
@@ -225,7 +225,7 @@ def _own(
     found = vote(votes, symmetry, model.config.voting)
     rows = jax.random.permutation(key, len(found.origin))[: config.own]
     found = faced(jax.tree.map(lambda leaf: leaf[rows], found), seen.cloud, symmetry)
-    refined = refine(jax.lax.stop_gradient(model), seen, found, model.config.refinement.steps)
+    refined = refine_voted(jax.lax.stop_gradient(model), seen, found)
     return jax.lax.stop_gradient(joined(found, refined))
 
 

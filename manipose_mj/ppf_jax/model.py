@@ -211,11 +211,11 @@ def estimate_sample(
     free = free_space(cloud, config.refinement, key=free_key)
     few = first_votes(votes, config.voting.coarse_votes)
     seen = Evidence(cloud, few, log_extents, free)
-    refined = refine(model, seen, first, config.refinement.steps)
+    refined = refine_voted(model, seen, first)
     reading = read(model, seen, refined)
     likeliest = jnp.argmin(expected_turn(reading.logits))
     kin = related(refined.rotation[likeliest], refined.origin[likeliest], seen, config.symmetry)
-    others = refine_related(model, seen, kin)
+    kin, others = refine_likeliest(model, seen, kin)
     count = len(refined.origin)
     reading = joined(reading, read(model, seen, others))
     # Judged alike, a frame that the votes led to is the better bet.
@@ -288,10 +288,31 @@ def related(
     return faced(Hypotheses(turned, origins), seen.cloud, symmetry)
 
 
+def refine_voted(model: PoseModel, seen: Evidence, hypotheses: Hypotheses) -> Hypotheses:
+    """`refine` for what the votes give: on fewer points before the last correction."""
+    config = model.config.refinement
+    nearly = refine(model, seen.fewer(config.coarse_points), hypotheses, config.steps - 1)
+    return refine(model, seen, nearly, 1)
+
+
 def refine_related(model: PoseModel, seen: Evidence, hypotheses: Hypotheses) -> Hypotheses:
     """`refine` for the many that are wrong but for one: on fewer points."""
     config = model.config.refinement
     return refine(model, seen.fewer(config.related_points), hypotheses, config.related_steps)
+
+
+def refine_likeliest(
+    model: PoseModel, seen: Evidence, hypotheses: Hypotheses
+) -> tuple[Hypotheses, Hypotheses]:
+    """`refine_related` for the likeliest at first sight; these as they were, and refined."""
+    config = model.config.refinement
+    fewer = seen.fewer(config.related_points)
+    reading = read(model, fewer, hypotheses)
+    kept = min(config.related_kept, len(hypotheses.origin))
+    chosen = jax.lax.top_k(-expected_turn(reading.logits), kept)[1]
+    after = faced(corrected(hypotheses, reading), seen.cloud, model.config.symmetry)
+    hypotheses, after = (jax.tree.map(lambda leaf: leaf[chosen], h) for h in (hypotheses, after))
+    return hypotheses, refine(model, fewer, after, config.related_steps - 1)
 
 
 def read(model: PoseModel, seen: Evidence, hypotheses: Hypotheses) -> Reading:

@@ -11,6 +11,8 @@ from manipose_mj.ppf_jax.refinement import RefinementConfig
 from manipose_mj.ppf_jax.symmetry import CommonSymmetry, common_symmetry
 from manipose_mj.ppf_jax.voting import VotingConfig
 
+TYPE_POINTS = 384
+
 
 def model_config(clouds: Sequence[LabelledCloud]) -> ModelConfig:
     """The model for a training set: of one category, or of several.
@@ -20,13 +22,17 @@ def model_config(clouds: Sequence[LabelledCloud]) -> ModelConfig:
     """
     symmetry = common_symmetry(cloud.symmetry for cloud in clouds)
     if len({cloud.category for cloud in clouds}) == 1:
-        return ModelConfig(symmetry=symmetry, pairs=pairs_for(symmetry))
+        return category_config(symmetry)
     return type_config(symmetry)
 
 
-def pairs_for(symmetry: CommonSymmetry) -> int:
-    """Votes for one axis need be half as many as those for a frame."""
-    return ModelConfig.pairs // 2 if symmetry.axial else ModelConfig.pairs
+def category_config(symmetry: CommonSymmetry) -> ModelConfig:
+    """As fast as it may be: what it leaves out of the defaults changes no figure of a category's table."""
+    return ModelConfig(
+        symmetry=symmetry,
+        voting=VotingConfig(axes_kept=2 if symmetry.axial else 3),
+        pairs=ModelConfig.pairs // 2,
+    )
 
 
 def type_config(symmetry: CommonSymmetry) -> ModelConfig:
@@ -39,7 +45,10 @@ def type_config(symmetry: CommonSymmetry) -> ModelConfig:
         symmetry=symmetry,
         network=NetworkConfig(local_width=48, width=96, pair_width=96, lines=True),
         voting=VotingConfig(axes_kept=6),
-        refinement=RefinementConfig(widths=(96, 192), hidden=192),
-        pairs=pairs_for(symmetry),
-        points=384,
+        refinement=RefinementConfig(
+            widths=(96, 192), hidden=192, coarse_points=TYPE_POINTS, related_kept=8
+        ),
+        # Votes for one axis need be half as many as those for a frame.
+        pairs=ModelConfig.pairs // (2 if symmetry.axial else 1),
+        points=TYPE_POINTS,
     )

@@ -42,9 +42,11 @@ class RefinementConfig:
     Attributes:
       widths: Of the layers on points.
       hidden: Of the layer on the pooled features.
-      steps: Corrections of each hypothesis that the votes give.
-      related_steps: Corrections of what the best of these may be mistaken for.
+      steps: Corrections of each hypothesis that the votes give, at least 1.
+      coarse_points: Points of the cloud that these corrections look at, but for the last, which sees all.
+      related_steps: Corrections of what the best of these may be mistaken for, at least 1.
       related_points: Points of the cloud that these corrections look at.
+      related_kept: How many of these, the likeliest at first sight, are corrected and judged to the end.
       related_handicap: By how much one of these must be judged less far off to be preferred [rad].
       free_points: Points of empty space.
       free_reach: How far from the surface these are at most, in units of the cloud's size.
@@ -53,8 +55,10 @@ class RefinementConfig:
     widths: tuple[int, int] = (64, 128)
     hidden: int = 128
     steps: int = 2
+    coarse_points: int = 128
     related_steps: int = 3
     related_points: int = 128
+    related_kept: int = 4
     related_handicap: float = float(np.radians(10.0))
     free_points: int = 64
     free_reach: float = 2.0

@@ -14,7 +14,6 @@ from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.model import ModelConfig, PoseModel, estimate_sample
-from manipose_mj.ppf_jax.relatives import relatives
 from manipose_mj.ppf_jax.voting import VotingConfig
 from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
 
@@ -68,8 +67,8 @@ def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
     estimator = PoseEstimator(trained)
     first, again = (estimator.estimate(mug, key=KEY) for _ in range(2))
     assert np.array_equal(first.pose, again.pose) and first.confidence == again.confidence
-    # 2 X axes with 2 turns each, and what the best may be mistaken for.
-    assert len(first.hypotheses) + 1 == 4 + len(relatives(CONFIG.symmetry))
+    # 2 X axes with 2 turns each, and the likeliest of what the best may be mistaken for.
+    assert len(first.hypotheses) + 1 == 4 + CONFIG.refinement.related_kept
     assert not first.hypotheses[0].hypotheses
     assert 0 <= first.confidence <= 1 and np.all(first.extents > 0)
 
