@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from manipose_mj.ppf_jax.part_network import LENGTH, SLIDE_LENGTH, TURN, BodyCloud, PointVotes
+from manipose_mj.ppf_jax.voting import any_perpendicular, unit_or
 
 EVIDENCE = 4
 _NOWHERE = 1e3  # [m], where no point votes for
@@ -185,12 +186,14 @@ def _part(
     centre = settled(centres, LENGTH * scale_of("centre"), peak, held)
     sure = moving / (scale_of("axis") + 0.05)
     hinge = jax.nn.sigmoid(sure @ votes.hinge / (jnp.sum(sure) + 1e-9))
-    axis = _snapped(unit(settled(votes.values["axis"], scale_of("axis"))), config.snap)
-    y = unit(settled(votes.values["y"], scale_of("y")))
+    # Where nobody votes for a part, it is still a frame.
+    front = jnp.array([1.0, 0.0, 0.0])
+    axis = _snapped(unit_or(settled(votes.values["axis"], scale_of("axis")), front), config.snap)
+    y = unit_or(settled(votes.values["y"], scale_of("y")), front)
     # A drawer's handle looks the way it slides.
     y = jnp.where((hinge < 0.5) & (y @ axis > np.cos(config.snap)), axis, y)
     x = settled(votes.values["x"], scale_of("x"))
-    x = unit(x - (x @ y) * y)
+    x = unit_or(x - (x @ y) * y, any_perpendicular(y))
     rotation = jnp.stack([x, y, jnp.cross(x, y)], axis=-1)
     feet = cloud.points + LENGTH * votes.values["line"]
     feet = feet - (feet @ axis)[:, None] * axis

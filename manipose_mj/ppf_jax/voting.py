@@ -97,7 +97,7 @@ def vote(votes: PairVotes, symmetry: CommonSymmetry, config: VotingConfig) -> Hy
     peaks = _peaks(scores, sphere, config.axes_kept, config.separation, symmetry.unsigned_x)
     x_axes = jax.vmap(lambda start: _polished_direction(x_votes, start, config.polishing))(peaks)
     if symmetry.axial:
-        y_axes = jax.vmap(_any_perpendicular)(x_axes)[:, None]
+        y_axes = jax.vmap(any_perpendicular)(x_axes)[:, None]
     else:
         y_axes = jax.vmap(lambda x: _turns_about(x, few_y, y_votes, symmetry, config))(x_axes)
     x_axes = jnp.broadcast_to(x_axes[:, None], y_axes.shape).reshape(-1, 3)
@@ -186,7 +186,7 @@ def _polished_direction(
         cosine = axis @ columns
         meant = jnp.where(unsigned & (cosine < 0), -value, value) if unsigned.any() else value
         weight = _cauchy(certainty, cosine - meant)
-        return _unit(_solve(columns, meant, weight, axis), axis)
+        return unit_or(_solve(columns, meant, weight, axis), axis)
 
     return jax.lax.fori_loop(0, rounds, refine, start)
 
@@ -199,7 +199,7 @@ def _turns_about(
     config: VotingConfig,
 ) -> Float[Array, "turns 3"]:
     """The peaks of Y about a given X."""
-    first = _any_perpendicular(x)
+    first = any_perpendicular(x)
     angles = jnp.arange(config.turns)[:, None] * (2 * np.pi / config.turns)
     circle = jnp.cos(angles) * first + jnp.sin(angles) * jnp.cross(x, first)
     scores = _direction_scores(few, circle)
@@ -207,7 +207,7 @@ def _turns_about(
 
     def polished(start: Array) -> Array:
         y = _polished_direction(votes, start, config.polishing)
-        return _unit(y - (y @ x) * x, start)
+        return unit_or(y - (y @ x) * x, start)
 
     return jax.vmap(polished)(starts)
 
@@ -277,12 +277,14 @@ def _solve3(matrix: Float[Array, "3 3"], right: Float[Array, "3"]) -> Float[Arra
     return (right[0] * bc + right[1] * ca + right[2] * ab) / (a @ bc)
 
 
-def _unit(vector: Float[Array, "3"], otherwise: Float[Array, "3"]) -> Float[Array, "3"]:
+def unit_or(vector: Float[Array, "3"], otherwise: Float[Array, "3"]) -> Float[Array, "3"]:
+    """The vector at length 1; `otherwise` where it has next to none."""
     length = jnp.sqrt(jnp.sum(vector**2))
     return jnp.where(length > 1e-6, vector / jnp.maximum(length, 1e-6), otherwise)
 
 
-def _any_perpendicular(axis: Float[Array, "3"]) -> Float[Array, "3"]:
+def any_perpendicular(axis: Float[Array, "3"]) -> Float[Array, "3"]:
+    """A unit vector across a unit vector."""
     smallest = jax.nn.one_hot(jnp.argmin(jnp.abs(axis)), 3, dtype=axis.dtype)
     across = smallest - (smallest @ axis) * axis
     return across / jnp.sqrt(jnp.sum(across**2))

@@ -320,6 +320,8 @@ def test_any_cloud_gets_answers_that_are_finite_and_repeatable(estimator, scene,
     assert all(len(parts) == CONFIG.voting.parts for parts in answers)
     for part in answers[0]:
         assert np.isfinite(part.handle).all() and np.isfinite(part.axis_origin).all()
+        # Also of a part that no point votes for.
+        assert np.linalg.det(part.handle[:3, :3]) == pytest.approx(1.0, abs=1e-3)
         assert np.linalg.norm(part.axis) == pytest.approx(1.0, abs=1e-3)
         np.testing.assert_allclose(
             part.handle[:3, :3] @ part.handle[:3, :3].T, np.eye(3), atol=1e-3
