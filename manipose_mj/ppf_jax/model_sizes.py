@@ -27,7 +27,7 @@ def model_config(clouds: Sequence[LabelledCloud]) -> ModelConfig:
 
 
 def category_config(symmetry: CommonSymmetry) -> ModelConfig:
-    """As fast as it may be: what it leaves out of the defaults changes no figure of a category's table."""
+    """With fewer votes and hypotheses than the defaults, which are slower and no better (`docs/pose.md`)."""
     return ModelConfig(
         symmetry=symmetry,
         voting=VotingConfig(axes_kept=2 if symmetry.axial else 3),
