@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
+
+import pytest
 
 # Before NumPy loads: xdist gives every core a worker, and threads on top only slow each other down.
 for _library in ("OPENBLAS", "OMP", "MKL"):
@@ -16,3 +19,15 @@ os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))
 # Both workers compile much the same, and so does the next run. Read when JAX is imported.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
+
+# Files whose tests take long though they are few.
+_LONG = ("test_shipped_furniture", "test_shipped_weights", "test_training", "test_shipped_types")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files first, then those of many tests, so that the workers end at about the same time.
+
+    In the order that pytest-xdist would choose itself, a file of one test comes last, however long it takes.
+    """
+    tests = Counter(item.path for item in items)
+    items.sort(key=lambda item: (item.path.stem not in _LONG, -tests[item.path], item.path))
