@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
+import jax
 import pytest
 
 from manipose_mj.ppf_jax.articulated_cache import furniture_names, furniture_scenes
@@ -15,6 +16,16 @@ from manipose_mj.ppf_jax.articulated_metrics import summary
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
 
 
+@pytest.fixture
+def optimised():
+    """Compiled code that is as quick as users have it: these clouds are large."""
+    before = jax.config.read("jax_disable_most_optimizations")
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", before)
+
+
+@pytest.mark.usefixtures("optimised")
 def test_they_reproduce_published_shares():
     """Of every fifth test object, half of the scenes that docs/pose.md counts, three views fused."""
     scenes = furniture_scenes(furniture_names("test")[::5], "front", scenes=4)
@@ -23,7 +34,7 @@ def test_they_reproduce_published_shares():
     found = evaluated(estimator, scene_clouds(scenes, fused=3))
     figures = summary(found.errors, found.strange, found.clouds)
     assert figures["n"] == 32
-    # One of 32 parts may be at the edge of a bar: tests compile without optimisation.
+    # One of 32 parts may be at the edge of a bar, and rounding differs between machines.
     assert figures["all_right"] == pytest.approx(0.906, abs=0.04)
     assert figures["joint_right"] == pytest.approx(0.906, abs=0.04)
     assert figures["strange_per_cloud"] < 0.2
