@@ -135,22 +135,30 @@ def _fitted_handle(
     config: HandleFitConfig,
 ) -> tuple[Float[Array, "4 4"], Float[Array, ""]]:
     """The handle, and the height of its panel above its centre [m]."""
-    centre, rotation = handle[:3, 3], handle[:3, :3]
-    low = high = jnp.zeros(())
-    panel = jnp.asarray(_USUAL)
-    for reach in config.reaches:
+    centre, farthest = handle[:3, 3], max(config.reaches)
+
+    def look(
+        known: tuple[Array, Array, Array, Array], reach: Array
+    ) -> tuple[tuple[Array, Array, Array, Array], None]:
+        rotation = known[0]
         own = (points - centre) @ rotation
         panel = _panel_height(own, mask)
         on = mask & (jnp.abs(own[:, 2]) < config.across) & (jnp.abs(own[:, 0]) < reach)
         on &= (own[:, 1] > config.height * panel) & (own[:, 1] < _FRONT)
-        high = _end(binned_counts(own[:, 0], on, (0.0, reach), _BIN), _BIN, config.gap)
-        low = -_end(binned_counts(-own[:, 0], on, (0.0, reach), _BIN), _BIN, config.gap)
-        on &= (own[:, 0] <= high) & (own[:, 0] >= low)
-        sure = (jnp.sum(on) >= config.least) & (high - low > config.turned)
+        high, low = (
+            _end(binned_counts(along, on, (0.0, farthest), _BIN), _BIN, config.gap)
+            for along in (own[:, 0], -own[:, 0])
+        )
+        on &= (own[:, 0] <= high) & (own[:, 0] >= -low)
+        sure = (jnp.sum(on) >= config.least) & (high + low > config.turned)
         slope = jnp.where(sure, _slope(own[:, 0], own[:, 2], on), 0.0)
         rotation = rotation @ from_vector(jnp.array([0.0, -1.0, 0.0]) * jnp.arctan(slope))
         high, low = (jnp.where(jnp.sum(on) >= config.least, end, 0.0) for end in (high, low))
-    return compose(rotation, centre + 0.5 * (low + high) * rotation[:, 0]), panel
+        return (rotation, high, low, panel), None
+
+    start = handle[:3, :3], jnp.zeros(()), jnp.zeros(()), jnp.asarray(_USUAL)
+    (rotation, high, low, panel), _ = jax.lax.scan(look, start, jnp.asarray(config.reaches))
+    return compose(rotation, centre + 0.5 * (high - low) * rotation[:, 0]), panel
 
 
 def _fitted_hinge(
