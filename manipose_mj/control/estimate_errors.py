@@ -25,7 +25,7 @@ class EstimateErrors:
         self.translation: float | None = None
         self.rotation: float | None = None
         self._seen: tuple[Estimate, ...] = ()
-        self._worst = ""
+        self._worst, self._worst_by = "", 0.0  # what is said of it; how many times the tolerance
 
     def after_planning(self) -> None:
         """Compare what the last plan was made with; the simulation has not gone on since."""
@@ -53,7 +53,10 @@ class EstimateErrors:
         truth = thing.label_pose(self._physics)
         errors = pose_error(estimate.pose, truth, thing.asset.label.symmetry)
         shift, turn = float(errors[0]), float(errors[1])
-        if shift > (self.translation or 0.0) or turn > (self.rotation or 0.0):
+        tolerance = self._task.config.tolerance
+        beyond = max(shift / tolerance.translation, turn / tolerance.rotation)
+        if beyond > self._worst_by:
+            self._worst_by = beyond
             self._worst = (
                 f"{estimate.name} was grasped with an estimate {100 * shift:.1f} cm and "
                 f"{np.degrees(turn):.0f} deg off (confidence {estimate.confidence:.2f})"

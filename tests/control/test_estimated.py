@@ -195,6 +195,24 @@ def test_a_failure_with_a_wrong_estimate_is_one_of_perception(cup, truth, shift,
     assert "the gripper closed past object" in cause.reason
 
 
+def test_the_estimate_that_is_named_is_the_one_beyond_the_tolerance(cup, truth):
+    baseline = Baseline(cup, "estimated")
+    senses = baseline.senses
+    assert isinstance(senses, EstimatedSenses)
+    errors = EstimateErrors(cup.task, cup.physics, baseline)
+    baseline.status = "grasp_at object"
+    for shift, turn in (
+        (0.001, 0.5),
+        (0.015, 0.05),
+    ):  # the second is farther off, within the tolerance
+        wrong = truth[0] @ compose(rotation_about(np.array([0.0, 0.0, 1.0]), turn), np.array([shift, 0, 0]))  # fmt: skip
+        senses.last_look = (Estimate("object", wrong, 0.9, "front"),)
+        errors.after_planning()
+    cause = errors.cause(StageFailure("plan", "none"))
+    assert cause.stage == "perception"
+    assert "0.1 cm and 29 deg off" in cause.reason
+
+
 def test_true_poses_have_no_estimate_errors(cup, truth):
     errors = EstimateErrors(cup.task, cup.physics, Baseline(cup, "oracle"))
     errors.after_planning()
