@@ -1,12 +1,13 @@
 """Table I: category-level pose from one partial, noisy cloud: ours, CPPF as published, matchers, the paper's.
 
     python benchmarks/pose_table.py [--categories bowl mug] [--setting anywhere|resting|tasks]
-        [--views 8] [--weights pose] [--no-matchers] [--jobs 1] [--json FILE]
+        [--views 8] [--weights DIR] [--no-matchers] [--jobs 1] [--json FILE]
 
 Every method sees the same clouds: views of the catalogue's test objects, which nothing was trained on.
-With `--weights DIR`, weights are read from `DIR/FOLDER/weights.npz`, FOLDER being what `manipose pose train`
-names its folder: CATEGORY for ours on unified labels, CATEGORY-original, CATEGORY-cppf, CATEGORY-cppf-original.
-Ours on unified labels are the package's own where DIR has none. What is not there is left out with a line.
+Weights are read from `DIR/FOLDER/weights.npz`, FOLDER being what `manipose pose train` names its folder:
+CATEGORY for ours on unified labels, CATEGORY-original, CATEGORY-cppf, CATEGORY-cppf-original. Without
+`--weights` they are those beside this file, for the paper's six categories. Ours on unified labels are the
+package's own where DIR has none. What is not there is left out with a line.
 On original labels each estimate is held against the object's frame as its source has it; of an axis of
 revolution, wherever that frame has it, only the direction counts, as with unified labels. How much these
 labels differ from one another, whatever the estimator: the row of what knows every pose and gives all objects
@@ -59,6 +60,7 @@ PAPER: dict[str, tuple[float, float]] = {
     "hammer": (1.68, 9.0),
     "razor": (1.20, 12.0),
 }
+WEIGHTS = Path(__file__).parent / "pose_table_weights"
 Row = dict[str, Any]
 # As rows are called, by whose weights they are.
 NETWORKS: dict[MethodName, str] = {"cppf": "CPPF as published", "ours": "ours"}
@@ -70,7 +72,7 @@ LABEL_SETS: tuple[LabelSet, ...] = ("unified", "original")
 def rows_of(
     category: str,
     clouds: Sequence[LabelledCloud],
-    weights: Path | None,
+    weights: Path,
     matchers: dict[str, Matcher],
     jobs: int,
 ) -> Iterator[Row]:
@@ -106,17 +108,14 @@ def rows_of(
 
 
 def _estimator(
-    category: str, weights: Path | None, method: MethodName, labels: LabelSet
+    category: str, weights: Path, method: MethodName, labels: LabelSet
 ) -> PoseEstimator | None:
     """From a folder of trainings, else from the package; None, with a line, where there is none."""
+    path = weights / folder_name(category, method, labels) / WEIGHTS_FILE
     try:
-        path = None
-        if weights is not None:
-            path = weights / folder_name(category, method, labels) / WEIGHTS_FILE
-        if (method, labels) == ("ours", "unified") and (path is None or not path.is_file()):
+        if (method, labels) == ("ours", "unified") and not path.is_file():
             return PoseEstimator.load(category)
-        if path is not None:
-            return PoseEstimator.from_file(path, method=method, labels=labels)
+        return PoseEstimator.from_file(path, method=method, labels=labels)
     except InputError as error:
         log.warning("%s, %s, %s labels: left out (%s)", category, method, labels, error)
     return None
@@ -203,7 +202,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--categories", nargs="+", default=list(PAPER), metavar="NAME")
     parser.add_argument("--setting", default="anywhere", help="such as anywhere, resting, tasks")
     parser.add_argument("--views", type=int, default=8, help="of each of the test objects")
-    parser.add_argument("--weights", type=Path, metavar="DIR")
+    parser.add_argument("--weights", type=Path, default=WEIGHTS, metavar="DIR")
     parser.add_argument("--no-matchers", action="store_true")
     parser.add_argument("--jobs", type=int, default=1, help="processes that render")
     parser.add_argument("--json", type=Path, metavar="FILE")

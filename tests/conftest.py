@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,13 @@ os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
 
 # Files whose tests take long though they are few.
-_LONG = ("test_shipped_furniture", "test_shipped_weights", "test_training", "test_shipped_types")
+_LONG = (
+    "test_shipped_furniture",
+    "test_shipped_weights",
+    "test_training",
+    "test_shipped_types",
+    "test_pose_table",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -31,3 +38,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     tests = Counter(item.path for item in items)
     items.sort(key=lambda item: (item.path.stem not in _LONG, -tests[item.path], item.path))
+
+
+@pytest.fixture
+def optimised() -> Iterator[None]:
+    """What JAX compiles is as quick as users have it, for estimators that compute longer than they compile."""
+    import jax
+
+    before = jax.config.read("jax_disable_most_optimizations")
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", before)

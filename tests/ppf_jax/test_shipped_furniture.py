@@ -5,7 +5,6 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-import jax
 import pytest
 
 from manipose_mj.ppf_jax.articulated_cache import furniture_names, furniture_scenes
@@ -14,15 +13,6 @@ from manipose_mj.ppf_jax.articulated_evaluation import evaluated, scene_clouds
 from manipose_mj.ppf_jax.articulated_metrics import summary
 
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
-
-
-@pytest.fixture
-def optimised():
-    """Compiled code that is as quick as users have it: these clouds are large."""
-    before = jax.config.read("jax_disable_most_optimizations")
-    jax.config.update("jax_disable_most_optimizations", False)
-    yield
-    jax.config.update("jax_disable_most_optimizations", before)
 
 
 @pytest.mark.usefixtures("optimised")
