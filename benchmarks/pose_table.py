@@ -84,7 +84,7 @@ def rows_of(
     yield _measured(category, ONE_FRAME, "original", clouds, _one_frame(clouds, frames), frames)
     for method, name in NETWORKS.items():
         for labels in LABEL_SETS:
-            estimator = _estimator(category, weights, method, labels)
+            estimator = estimator_of(category, weights, method, labels)
             if estimator is None:
                 continue
             sources = frames if labels == "original" else None
@@ -107,7 +107,7 @@ def rows_of(
         yield _measured(category, name, "unified", clouds, answered, None)
 
 
-def _estimator(
+def estimator_of(
     category: str, weights: Path, method: MethodName, labels: LabelSet
 ) -> PoseEstimator | None:
     """From a folder of trainings, else from the package; None, with a line, where there is none."""

@@ -20,13 +20,22 @@ from manipose_mj.ppf_jax.view_settings import view_setting
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
-@pytest.fixture(scope="module")
-def table():
-    sys.path.insert(0, str(BENCHMARKS))  # it loads its neighbours
+def benchmark(name: str):
+    sys.path.insert(0, str(BENCHMARKS))  # they load their neighbours
     try:
-        return importlib.import_module("pose_table")
+        return importlib.import_module(name)
     finally:
         sys.path.remove(str(BENCHMARKS))
+
+
+@pytest.fixture(scope="module")
+def table():
+    return benchmark("pose_table")
+
+
+@pytest.fixture(scope="module")
+def signs():
+    return benchmark("lost_signs")
 
 
 def cloud(name: str, pose: np.ndarray) -> LabelledCloud:
@@ -50,16 +59,16 @@ def test_one_frame_for_all_is_the_one_that_suits_most(table):
 
 
 def test_weights_that_are_not_there_are_named_and_left_out(table, tmp_path, caplog):
-    assert table._estimator("cup", tmp_path, "cppf", "original") is None
+    assert table.estimator_of("cup", tmp_path, "cppf", "original") is None
     assert "cup-cppf-original/weights.npz: no such file" in caplog.text
-    assert table._estimator("cup", tmp_path, "ours", "unified").trained.method == "ours"
+    assert table.estimator_of("cup", tmp_path, "ours", "unified").trained.method == "ours"
 
 
 @pytest.mark.parametrize("labels", ["unified", "original"])
 @pytest.mark.parametrize("method", ["cppf", "ours"])
 def test_weights_of_every_row_are_beside_the_table(table, method, labels):
     for category in table.PAPER:
-        trained = table._estimator(category, table.WEIGHTS, method, labels).trained
+        trained = table.estimator_of(category, table.WEIGHTS, method, labels).trained
         assert (trained.method, trained.labels) == (method, labels)
         assert trained.categories == (category,)
         path = table.WEIGHTS / table.folder_name(category, method, labels) / table.WEIGHTS_FILE
@@ -71,13 +80,13 @@ def test_they_reproduce_published_figures_of_bowls(table):
     """Of CPPF, which votes for seconds over each cloud, those of one view of each of eight objects."""
     clouds = catalogue_clouds("bowl", "test", view_setting("anywhere"), views=4, jobs=1)
     frames = source_labels(clouds)
-    found = answers(table._estimator("bowl", table.WEIGHTS, "ours", "original"), clouds, timed=0)
+    found = answers(table.estimator_of("bowl", table.WEIGHTS, "ours", "original"), clouds, timed=0)
     figures = summary(pose_errors(found.poses, clouds, sources=frames))
     assert figures["origin_cm_mean"] == pytest.approx(2.06, abs=0.1)
     assert figures["recall_5deg_5cm"] == pytest.approx(0.5, abs=0.05)
 
     few = catalogue_clouds("bowl", "test", view_setting("anywhere"), views=1, jobs=1)[:8]
-    found = answers(table._estimator("bowl", table.WEIGHTS, "cppf", "unified"), few, timed=0)
+    found = answers(table.estimator_of("bowl", table.WEIGHTS, "cppf", "unified"), few, timed=0)
     figures = summary(pose_errors(found.poses, few))
     assert figures["origin_cm_mean"] == pytest.approx(0.90, abs=0.1)
     assert figures["deg_mean"] == pytest.approx(7.7, abs=1.0)
@@ -92,3 +101,22 @@ def test_the_table_holds_rows_with_and_without_figures(table):
     assert rows[1]["ms_per_object"] is None
     assert table.table_of(rows, "anywhere").row_count == 2
     assert "50 50 50" in table._cell(rows[1]) and "flipped 25.0%" in table._cell(rows[1])
+
+
+def test_signs_are_lost_by_half_turns_alone(signs):
+    x, y, _ = np.eye(3)
+    truth = rotation_about(np.array([0.6, 0.0, 0.8]), 1.0)
+    one, planes = SymmetryGroup.identity(), SymmetryGroup.two_planes()
+    round_x = SymmetryGroup.about_x()
+    assert signs.reversed_axes(truth @ rotation_about(x, np.pi), truth, one) == (False, True)
+    assert signs.reversed_axes(truth @ rotation_about(y, np.pi), truth, one) == (True, False)
+    assert signs.reversed_axes(truth @ rotation_about(x, np.pi), truth, planes) == (False, False)
+    assert signs.reversed_axes(truth @ rotation_about(y, 3.0), truth, round_x) == (True, False)
+    assert signs.reversed_axes(truth @ rotation_about(x, 3.0), truth, round_x) == (False, False)
+
+    seen = cloud("a/0", compose(truth, np.zeros(3)))
+    turned = compose(truth @ rotation_about(y, np.pi - np.radians(7)), np.zeros(3))
+    row = signs.row_of("thing", "anywhere", [seen], turned[None])
+    assert row["deg_mean"] == pytest.approx(173, abs=0.01)
+    assert row["signs_given_deg_mean"] == pytest.approx(7, abs=0.01)
+    assert (row["x_reversed"], row["y_reversed"]) == (1, 0)
