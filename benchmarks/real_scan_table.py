@@ -5,12 +5,12 @@
         [--weights pose] [--only NAME ...] [--worst 10 --pictures DIR] [--json FILE]
 
 Built assets are rendered as the catalogue is for the other tables. A scan is estimated by the network of
-its category where there is one that knows its symmetry, else by that of its label's type; one that has neither is left out with a
-line. With `--weights DIR`, these are `DIR/NAME/weights.npz`, as `manipose pose train` writes them; without,
-the package's own. The bar is the paper's ManiPose column of the same category, or the mean over its two
-categories of the same type: the mean must not pass it, nor the median half of it; turns about the axis do not count where the
-category's label leaves them open. Exits with 1 if a scan
-of a kind that the catalogue has misses its bar.
+its category where there is one that knows its symmetry, else by that of its label's type, or by both where the
+catalogue's things of its kind are round and it is not; one that has neither is left out with a line. With
+`--weights DIR`, these are `DIR/NAME/weights.npz`, as `manipose pose train` writes them; without, the package's
+own. The bar is the paper's ManiPose column of the same category, or the mean over its two categories of the
+same type: the mean must not pass it, nor the median half of it; turns about the axis do not count where the
+category's label leaves them open. Exits with 1 if a scan of a kind that the catalogue has misses its bar.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from manipose_mj.ppf_jax.asset_views import views_of
 from manipose_mj.ppf_jax.clouds import LabelledCloud
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation import answers
+from manipose_mj.ppf_jax.flattened import FlattenedEstimator
 from manipose_mj.ppf_jax.metrics import PoseErrors, pose_errors, summary
 from manipose_mj.ppf_jax.symmetry import common_symmetry
 from manipose_mj.ppf_jax.view_settings import ViewSetting, view_setting
@@ -79,23 +80,33 @@ class Row:
         )
 
 
-def estimator_of(asset: Asset, weights: Path | None) -> tuple[str, PoseEstimator] | None:
+def estimator_of(
+    asset: Asset, weights: Path | None
+) -> tuple[str, PoseEstimator | FlattenedEstimator] | None:
     """The network for an asset, with its name; None where there are no weights."""
     kind, row = asset.label.object_type, CATALOGUE.get(asset.category)
     names = [asset.category, kind] if row is not None and row.object_type == kind else [kind]
     for name in names:
-        try:
-            if weights is None:
-                estimator = PoseEstimator.load(name)
-            else:
-                estimator = PoseEstimator.from_file(weights / name / "weights.npz")
-        except InputError:
+        estimator = _network(name, weights)
+        if estimator is None or not fits(kind_symmetry(asset), estimator):
             continue
-        if fits(kind_symmetry(asset), estimator):
-            # The package gives a category without weights its type's.
-            only = estimator.trained.categories == (asset.category,)
-            return (asset.category if only else kind), estimator
+        if row is not None and (row.object_type, kind) == ("axial", "mirror"):
+            upright = _network(asset.category, weights) or _network("axial", weights)
+            if upright is not None:
+                return "axial, mirror", FlattenedEstimator(upright, estimator)
+        # The package gives a category without weights its type's.
+        only = estimator.trained.categories == (asset.category,)
+        return (asset.category if only else kind), estimator
     return None
+
+
+def _network(name: str, weights: Path | None) -> PoseEstimator | None:
+    try:
+        if weights is None:
+            return PoseEstimator.load(name)
+        return PoseEstimator.from_file(weights / name / "weights.npz")
+    except InputError:
+        return None
 
 
 def fits(group: SymmetryGroup, estimator: PoseEstimator) -> bool:

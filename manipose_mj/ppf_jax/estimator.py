@@ -232,13 +232,13 @@ def _as_estimate(found: Estimates, axial: bool) -> PoseEstimate:
         np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
     )
     each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
-    order = _distinct_first(poses, axial)
+    order = distinct_first(poses, axial)
     first = each[0]
     others = tuple(each[i] for i in order[1:])
     return PoseEstimate(first.pose, first.extents, first.confidence, others)
 
 
-def _distinct_first(poses: Float[np.ndarray, "h 4 4"], axial: bool) -> list[int]:
+def distinct_first(poses: Float[np.ndarray, "h 4 4"], axial: bool) -> list[int]:
     """Rows in their order, but after all others those that are near one before them."""
     group = SymmetryGroup.about_x() if axial else SymmetryGroup.identity()
     shift, turn = pose_error(poses[:, None].astype(float), poses[None].astype(float), group)

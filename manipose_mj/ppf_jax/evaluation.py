@@ -16,6 +16,7 @@ from manipose_mj.errors import unknown_name
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.clouds import LabelledCloud
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
+from manipose_mj.ppf_jax.flattened import FlattenedEstimator
 from manipose_mj.ppf_jax.view_cache import catalogue_subject
 
 _TIMED, _TIMED_S = (
@@ -41,7 +42,7 @@ class Answers:
 
 
 def answers(
-    estimator: PoseEstimator,
+    estimator: PoseEstimator | FlattenedEstimator,
     clouds: Sequence[LabelledCloud],
     *,
     batch: int = 32,
@@ -71,7 +72,9 @@ def answers(
     )
 
 
-def _one_by_one(estimator: PoseEstimator, clouds: Sequence[LabelledCloud]) -> float:
+def _one_by_one(
+    estimator: PoseEstimator | FlattenedEstimator, clouds: Sequence[LabelledCloud]
+) -> float:
     """Median milliseconds for one object's bare points, from which normals are estimated."""
     key = jax.random.key(0)
     for sized in {bucket(len(cloud)): cloud for cloud in clouds}.values():
