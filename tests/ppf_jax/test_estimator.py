@@ -80,12 +80,12 @@ def test_other_hypotheses_come_before_what_is_nearly_said_already():
         )
 
     poses = np.stack([upside_down(d) for d in (0, 4, 181, 10, 90, 178)]).astype(np.float32)
-    assert module._distinct_first(poses, axial=True) == [0, 2, 4, 1, 3, 5]
+    assert module.distinct_first(poses, axial=True) == [0, 2, 4, 1, 3, 5]
     spun = compose(rotation_about(np.array([1.0, 0.0, 0.0]), 1.0), np.array([0, 0, 0.5]))
     moved = compose(np.eye(3), np.array([0, 0.03, 0.5]))
     poses = np.stack([upside_down(0), spun, moved]).astype(np.float32)
-    assert module._distinct_first(poses, axial=True) == [0, 2, 1]
-    assert module._distinct_first(poses, axial=False) == [0, 1, 2]
+    assert module.distinct_first(poses, axial=True) == [0, 2, 1]
+    assert module.distinct_first(poses, axial=False) == [0, 1, 2]
 
 
 def test_stray_points_and_bad_normals_give_no_nan(trained, mug):
