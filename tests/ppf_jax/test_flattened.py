@@ -49,3 +49,25 @@ def test_only_of_round_categories():
         FlattenedEstimator.load("mug")
     with pytest.raises(InputError, match="unknown axial category 'botle'.*bottle"):
         FlattenedEstimator.load("botle")
+
+
+def test_one_cloud_or_many():
+    class Says:
+        def __init__(self, *answers):
+            self.answers = answers
+
+        def estimate(self, cloud, *, key):
+            return self.answers[cloud]
+
+        def estimate_many(self, clouds, *, key):
+            return [self.answers[cloud] for cloud in clouds]
+
+    lying, wide = estimate(Z, 90, WIDE, 0.9), estimate(X, 0, WIDE, 0.3)
+    estimator = FlattenedEstimator(
+        Says(estimate(X, 70, WIDE, 0.9), estimate(Z, 90, WIDE, 0.9)),
+        Says(replace(lying, hypotheses=(wide,)), replace(lying, hypotheses=(wide,))),
+    )
+    many = estimator.estimate_many([0, 1], key=None)
+    assert [each.confidence for each in many] == [0.3, 0.9]
+    for cloud in (0, 1):
+        assert np.array_equal(estimator.estimate(cloud, key=None).pose, many[cloud].pose)
