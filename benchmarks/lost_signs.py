@@ -31,7 +31,7 @@ from manipose_mj.ppf_jax.view_cache import catalogue_clouds
 from manipose_mj.ppf_jax.view_settings import view_setting
 from manipose_mj.ppf_jax.weights import MethodName
 
-Row = dict[str, str | float | None]
+Row = dict[str, str | float]
 _HALF_TURNS = SymmetryGroup.three_planes().rotations
 
 

@@ -201,11 +201,10 @@ def test_the_estimate_that_is_named_is_the_one_beyond_the_tolerance(cup, truth):
     assert isinstance(senses, EstimatedSenses)
     errors = EstimateErrors(cup.task, cup.physics, baseline)
     baseline.status = "grasp_at object"
-    for shift, turn in (
-        (0.001, 0.5),
-        (0.015, 0.05),
-    ):  # the second is farther off, within the tolerance
-        wrong = truth[0] @ compose(rotation_about(np.array([0.0, 0.0, 1.0]), turn), np.array([shift, 0, 0]))  # fmt: skip
+    # The second is farther off, but within the tolerance.
+    for shift, turn in ((0.001, 0.5), (0.015, 0.05)):
+        turned = rotation_about(np.array([0.0, 0.0, 1.0]), turn)
+        wrong = truth[0] @ compose(turned, np.array([shift, 0, 0]))
         senses.last_look = (Estimate("object", wrong, 0.9, "front"),)
         errors.after_planning()
     cause = errors.cause(StageFailure("plan", "none"))
