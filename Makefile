@@ -4,13 +4,24 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test lint bench conformance clean
+# Workers take tests from one another when they run out of their own.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
+
+.PHONY: demo test test-full test-all lint bench conformance docs release-check clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/manipose demo --out demo_report
 
+# The quick tier: every package and every task, in minutes.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(PYTEST) -m "not full"
+
+# What the quick tier leaves out.
+test-full: $(VENV)/.dev
+	$(PYTEST) -m full
+
+test-all: $(VENV)/.dev
+	$(PYTEST)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
@@ -23,8 +34,16 @@ bench: $(VENV)/.dev
 
 # Checkers of other libraries, and 2,000 random steps of every task; brings PyTorch.
 conformance: $(VENV)/.conformance
-	$(BIN)/python -m pytest tests/conformance
+	$(BIN)/python -m pytest tests/conformance tests/gym
 	$(BIN)/python benchmarks/random_steps.py
+
+# The site, into site/: index.html opens without a server. The variable keeps Material's notice about MkDocs 2 out.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean --quiet
+
+# Builds sdist and wheel, installs the wheel into an empty environment outside the repository, and uses it there.
+release-check: $(VENV)/.dev
+	$(BIN)/python .ci/release_check.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -41,5 +60,10 @@ $(VENV)/.conformance: $(VENV)/.dev
 	$(PIP) --editable ".[conformance]"
 	touch $@
 
+# Only what the extra lists: the site is built from sources that are read, not imported.
+$(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) $$($(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['docs'])")
+	touch $@
+
 clean:
-	rm -rf $(VENV) demo_report
+	rm -rf $(VENV) demo_report site

@@ -13,12 +13,12 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from asset_pipeline.asset_json import read_asset
-from asset_pipeline.build import SOURCES, build
-from asset_pipeline.build_pool import BuildResult
-from asset_pipeline.cavity_check import takes_ball
-from asset_pipeline.check import check_asset
-from asset_pipeline.scan import ScanItem
+from asset_pipeline.build.data_set import SOURCES, build
+from asset_pipeline.build.pool import BuildResult
+from asset_pipeline.checks.asset_check import check_asset
+from asset_pipeline.checks.cavity_check import takes_ball
+from asset_pipeline.sources.scan import ScanItem
+from manipose_mj.assets.asset_json import read_asset
 
 HEAD = ("object", "category", "size [cm]", "joints", "move", "cavities", "ball in", "handles",
         "labelled", "kg", "shapes", "build s")  # fmt: skip
@@ -60,18 +60,18 @@ def audit(result: BuildResult, item: ScanItem, source: str) -> list[str]:
     hollow = [p for p in asset.parts if p.cavity is not None]
     spilled = [line for p in hollow if (line := takes_ball(asset, p))]
     with SOURCES[source].opened(item) as scan:
-        wanted = {m.name for m in scan.moving if any(p.name == "handle" for p in m.parts)}
+        requested = {m.name for m in scan.moving if any(p.name == "handle" for p in m.parts)}
     labelled = {p.name for p in asset.parts if p.handle is not None}
     size = " x ".join(f"{100 * e:.0f}" for e in asset.label.extents)
     print(
         _row((
             result.name, asset.category, size, len(asset.parts), len(asset.parts) - len(stuck),
-            len(hollow), len(hollow) - len(spilled), len(wanted), len(wanted & labelled),
+            len(hollow), len(hollow) - len(spilled), len(requested), len(requested & labelled),
             f"{asset.mass_properties.mass:.1f}", checked.parts, f"{result.seconds:.1f}",
         )),
         flush=True,
     )  # fmt: skip
-    missing = [f"part {name!r} has a handle but no label" for name in sorted(wanted - labelled)]
+    missing = [f"part {name!r} has a handle but no label" for name in sorted(requested - labelled)]
     return [f"{result.name}: {line}" for line in (*checked.failures, *spilled, *missing)]
 
 

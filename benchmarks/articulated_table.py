@@ -17,20 +17,20 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, one_thread_per_process
 
 one_thread_per_process()
 
-from manipose_mj.ppf_jax.articulated_assets import asset_scenes  # noqa: E402
-from manipose_mj.ppf_jax.articulated_cache import furniture_names, furniture_scenes  # noqa: E402
-from manipose_mj.ppf_jax.articulated_clouds import (  # noqa: E402
+from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator  # noqa: E402
+from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes  # noqa: E402
+from manipose_mj.ppf_jax.data.articulated.cache import furniture_names, furniture_scenes  # noqa: E402
+from manipose_mj.ppf_jax.data.articulated.clouds import (  # noqa: E402
     FurnitureCloud,
     FurnitureScene,
     handle_poses,
 )
-from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator  # noqa: E402
-from manipose_mj.ppf_jax.articulated_evaluation import evaluated, scene_clouds  # noqa: E402
-from manipose_mj.ppf_jax.articulated_metrics import PartErrors, part_errors, summary  # noqa: E402
+from manipose_mj.ppf_jax.evaluation.part_evaluation import evaluated, scene_clouds  # noqa: E402
+from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors, part_errors, summary  # noqa: E402
 
 _WORST = 10
 
@@ -82,9 +82,9 @@ def _rows(
         if not own:
             continue
         row = {"objects": which, "views": fused, "category": kind} | summary(own, 0, 1)
-        del row["strange_per_cloud"]
+        del row["false_positives_per_cloud"]
         if kind == "all":
-            row["strange_per_cloud"] = found.strange / found.clouds
+            row["false_positives_per_cloud"] = found.false_positives / found.clouds
             row["cpu_ms_per_cloud"] = 1e3 * spent / found.clouds
         rows.append(row)
         print(json.dumps({k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()}))

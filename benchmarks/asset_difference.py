@@ -10,8 +10,8 @@ import trimesh
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from asset_pipeline.asset_json import read_asset
-from asset_pipeline.assets import Asset
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import read_asset
 
 # What is within these is noise: lengths [m], angles [rad], shares, and grey levels of 255.
 LENGTH, ANGLE, SHARE, GREY_LEVELS = 5e-4, np.deg2rad(0.5), 0.01, 2.0

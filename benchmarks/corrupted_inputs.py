@@ -3,7 +3,7 @@
     pip install .[dev]
     python benchmarks/corrupted_inputs.py [--examples 1000] [--limit-s 60] [--seed 0]
 
-The damages are those of `tests/asset_pipeline/damaged_files.py`: files truncated, emptied, missing, with
+The damages are those of `tests/asset_pipeline/sources/damaged_files.py`: files truncated, emptied, missing, with
 NaN, zero area, inverted faces, gigantic coordinates, other units, wrong indices and counts; references and
 archive members that leave their folder; cyclic URDFs and expanding entities. Every one has to be rejected
 with the file and the reason in one line, or repaired with a warning.
@@ -30,16 +30,16 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "asset_pipeline"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # its `tests` hold what damages files
 
 from asset_difference import difference
-from damaged_files import Case, cases
-from valid_files import SOURCES, valid
 
-from asset_pipeline.build import build
-from asset_pipeline.cache_root import CACHE_VARIABLE
-from asset_pipeline.limited_call import Limits
+from asset_pipeline.build.data_set import build
+from asset_pipeline.build.workers.limited_call import Limits
 from manipose_mj.errors import InputError
+from manipose_mj.storage.cache_root import CACHE_VARIABLE
+from tests.asset_pipeline.sources.damaged_files import Case, cases
+from tests.asset_pipeline.sources.valid_files import SOURCES, valid
 
 # To stop a build and tell so, on a busy machine [s].
 LEEWAY = 15.0

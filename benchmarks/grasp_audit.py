@@ -2,7 +2,7 @@
 
     python benchmarks/grasp_audit.py FOLDER_OF_ASSETS [--again] [--markdown FILE] [--record FILE]
 
-Every asset carries the outcome of its trials: `asset_pipeline.grasp_trial` closed a floating hand on up to
+Every asset carries the outcome of its trials: `asset_pipeline.build.grasp_trial` closed a floating hand on up to
 60 of its collision-free grasps, lifted and shook it, by friction alone, until 20 had held. `--again`
 repeats the trials here with a finer time step, a longer lift and a wider shake.
 """
@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
-from asset_pipeline.asset_json import list_assets, read_asset
-from asset_pipeline.assets import MIN_HELD
-from asset_pipeline.catalogue import CATALOGUE
-from asset_pipeline.grasp_trial import TrialConfig, with_trials
+from asset_pipeline.build.grasp_trial import TrialConfig, with_trials
+from manipose_mj.assets.asset import MIN_HELD
+from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.categories import CATALOGUE
 
 FINE = TrialConfig(
     timestep=0.002, close_time=0.5, lift=0.15, lift_time=0.4, shake=0.03, frequency=3.0

@@ -24,8 +24,9 @@ from joblib import Parallel, delayed
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from asset_pipeline.catalogue import CATALOGUE
 from asset_pipeline.labelling.scan_label import scan_label
+from manipose_mj.assets import catalogue
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.poses import SymmetryGroup, compose, pose_error, rotation_about, transform
 
 TRIANGLES = 16_000
@@ -147,7 +148,7 @@ def same_group(a: SymmetryGroup, b: SymmetryGroup) -> bool:
 def examine(category: str, index: int, seed: int) -> Outcome:
     """Hide one object's label and recover it."""
     row = CATALOGUE[category]
-    specimen = row.generate(index)
+    specimen = catalogue.generate(row.name, index)
     rng = np.random.default_rng([seed, index, len(category), *category.encode()])
     mesh = remeshed(specimen.bodies[0].surface(), rng)
     tool = row.object_type == "functional"

@@ -25,11 +25,11 @@ from rich.table import Table
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_error, rotation_angle
-from manipose_mj.ppf_jax.clouds import LabelledCloud
-from manipose_mj.ppf_jax.evaluation import answers, categories_of
-from manipose_mj.ppf_jax.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.view_settings import view_setting
-from manipose_mj.ppf_jax.weights import MethodName
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
+from manipose_mj.ppf_jax.data.view_settings import view_setting
+from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.weight_files import MethodName
 
 Row = dict[str, str | float]
 _HALF_TURNS = SymmetryGroup.three_planes().rotations
@@ -103,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 clouds = catalogue_clouds(
                     category, "test", setting, views=options.views, jobs=options.jobs
                 )
-                found = answers(estimator, clouds, batch=batch, timed=0)
+                found = predict(estimator, clouds, batch=batch, timed=0)
                 row = row_of(category, setting.name, clouds, found.poses)
                 rows.append(row)
                 table.add_row(

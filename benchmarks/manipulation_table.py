@@ -1,10 +1,10 @@
 """Print the manipulation table of the README: the baseline on every task and on real scans.
 
     python benchmarks/manipulation_table.py --episodes 50
-    python benchmarks/manipulation_table.py --assets BUILT_YCB --objects 006_mustard_bottle ...
+    python benchmarks/manipulation_table.py --objects BUILT_YCB/006_mustard_bottle ...
 
 Rows of built-in objects come from `manipose evaluate TASK... --episodes N --seed 0`; rows of scans
-from the same command with `--assets DIR --object NAME`.
+from the same command with `--objects DIR/NAME`.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ from manipose_mj.suite import ALL_TASKS
 
 @dataclass(frozen=True)
 class Arguments:
-    """Attributes: episodes of each row; seed; jobs; assets: folder of built scans; objects: which."""
+    """Attributes: episodes of each row; seed; jobs; objects: built-in ones or asset folders."""
 
     episodes: int = 50
     seed: int = 0
     jobs: int = 2
-    assets: Path | None = None
     objects: tuple[str, ...] = ()
 
 
@@ -51,8 +50,7 @@ def _rows(arguments: Arguments, tasks: tuple[str, ...], name: str | None) -> Non
             episodes=arguments.episodes,
             seed=arguments.seed,
             jobs=arguments.jobs,
-            assets=arguments.assets,
-            object_name=name,
+            objects=None if name is None else (name,),
         )
         results = evaluate(config)
     for task, row in summarize(results).items():

@@ -32,11 +32,11 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from asset_pipeline.build import build
-from asset_pipeline.cache_root import CACHE_VARIABLE
-from asset_pipeline.repair import closed, weld
+from asset_pipeline.build.data_set import build
+from asset_pipeline.geometry.repair import closed, weld
 from asset_pipeline.sources import ycb
 from manipose_mj.evaluation.statistics import machine
+from manipose_mj.storage.cache_root import CACHE_VARIABLE
 
 POINTS = 200_000  # on each surface: about 0.5 mm apart
 

@@ -17,7 +17,7 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from asset_pipeline.catalogue import CATALOGUE
+from manipose_mj.assets import catalogue
 from manipose_mj.poses import compose, invert, transform
 
 TEMPLATE_POINTS = 2000
@@ -47,7 +47,7 @@ Matcher = Callable[[Template], Match]
 
 def template(category: str) -> Template:
     """The template of a category."""
-    specimen = CATALOGUE[category].generate(TEMPLATE_INDEX)
+    specimen = catalogue.generate(category, TEMPLATE_INDEX)
     surface = specimen.bodies[0].surface()
     points, faces = trimesh.sample.sample_surface(surface, TEMPLATE_POINTS, seed=0)[:2]
     placed = invert(specimen.label.pose)

@@ -3,7 +3,7 @@
     python benchmarks/pose_robustness.py --picture robustness.png [--json FILE] [--categories bowl ...]
         [--weights pose] [--views 4] [--setting anywhere] [--jobs 1]
 
-Test objects of the catalogue; bare points, so that normals are estimated from the spoilt cloud. Outliers
+Test objects of the catalogue; bare points, so that normals are estimated from the corrupted cloud. Outliers
 fill a ball of one and a half times the object's radius; what hides is a straight edge at any angle. The same
 views at every share. Networks are the package's, or `DIR/CATEGORY/weights.npz` with `--weights DIR`. Views that
 keep fewer points than an estimator accepts are left out and counted. Exits with 1 if an answer is not finite.
@@ -24,16 +24,16 @@ from rich.console import Console
 from rich.table import Table
 
 from manipose_mj.errors import InputError
-from manipose_mj.ppf_jax.clouds import LabelledCloud
-from manipose_mj.ppf_jax.corruption import partly_hidden, with_outliers
+from manipose_mj.ppf_jax.data.augmentation.corruption import partly_hidden, with_outliers
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
+from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import MIN_POINTS, PoseEstimator
-from manipose_mj.ppf_jax.metrics import pose_errors, summary
-from manipose_mj.ppf_jax.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.view_settings import view_setting
+from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors, summary
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 
 CATEGORIES = ("bowl", "box", "cup", "hammer", "mug", "razor")
-Spoil = Callable[[np.ndarray, float, np.random.Generator], np.ndarray]
-KINDS: dict[str, tuple[Spoil, tuple[float, ...]]] = {
+Corruption = Callable[[np.ndarray, float, np.random.Generator], np.ndarray]
+KINDS: dict[str, tuple[Corruption, tuple[float, ...]]] = {
     "outliers": (with_outliers, (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)),
     "hidden": (partly_hidden, (0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8)),
 }
@@ -44,7 +44,7 @@ _BATCH = 40
 class Row:
     """One category at one share.
 
-    Attributes: category; kind of spoiling; share; n views, left_out for too few points; finite,
+    Attributes: category; kind of corruption; share; n views, left_out for too few points; finite,
     whether every answer was; means and medians [deg, cm].
     """
 
@@ -67,18 +67,18 @@ def row_of(
     estimator: PoseEstimator,
     clouds: Sequence[LabelledCloud],
 ) -> Row:
-    """Spoil the clouds, estimate, compare."""
-    spoil, _ = KINDS[kind]
-    spoilt = [
-        spoil(cloud.points, share, np.random.default_rng([i, len(kind)]))
+    """Corrupt the clouds, estimate, compare."""
+    corrupt, _ = KINDS[kind]
+    corrupted = [
+        corrupt(cloud.points, share, np.random.default_rng([i, len(kind)]))
         for i, cloud in enumerate(clouds)
     ]
-    rows = [i for i, points in enumerate(spoilt) if len(points) >= MIN_POINTS]
+    rows = [i for i, points in enumerate(corrupted) if len(points) >= MIN_POINTS]
     found = []
     for start in range(0, len(rows), _BATCH):
-        some = [spoilt[i] for i in rows[start : start + _BATCH]]
+        some = [corrupted[i] for i in rows[start : start + _BATCH]]
         # Filled up, so that all batches have one shape.
-        filled = some + [spoilt[rows[0]]] * (_BATCH - len(some))
+        filled = some + [corrupted[rows[0]]] * (_BATCH - len(some))
         key = jax.random.fold_in(jax.random.key(0), start)
         found += estimator.estimate_many(filled, key=key)[: len(some)]
     finite = all(

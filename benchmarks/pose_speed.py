@@ -31,16 +31,16 @@ from jaxtyping import Float
 from pose_matchers import available, template
 from scipy.spatial.transform import Rotation
 
-from manipose_mj.cli.process import compile_at_once_on_gpus
+from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.statistics import machine
-from manipose_mj.ppf_jax.cloud_normals import cloud_normals
-from manipose_mj.ppf_jax.clouds import MAX_POINTS
-from manipose_mj.ppf_jax.cppf import CppfModel
-from manipose_mj.ppf_jax.cppf_voting import CppfConfig
+from manipose_mj.ppf_jax.cppf.model import CppfModel
+from manipose_mj.ppf_jax.cppf.voting import CppfConfig
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.model import PoseModel, estimate_batch
-from manipose_mj.ppf_jax.weights import TrainedModel
+from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.points.clouds import MAX_POINTS
+from manipose_mj.ppf_jax.rigid.model import PoseModel, estimate_batch
+from manipose_mj.ppf_jax.weight_files import TrainedModel
 
 BATCH = 1024
 OBJECTS, SLOW_OBJECTS = 100, 4  # timed one by one: ours; of methods that take seconds

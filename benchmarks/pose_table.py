@@ -38,17 +38,22 @@ from pose_matchers import Matcher, available, template
 from rich.console import Console
 from rich.table import Table
 
-from manipose_mj.cli.pose_train import WEIGHTS_FILE, folder_name
+from manipose_mj.cli.pose.train import WEIGHTS_FILE, folder_name
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
-from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.data.source_frames import SourceLabel
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
+from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.evaluation import Answers, answers, catalogue_hulls, categories_of
-from manipose_mj.ppf_jax.metrics import pose_errors, summary
-from manipose_mj.ppf_jax.source_frames import SourceLabel
-from manipose_mj.ppf_jax.view_cache import catalogue_clouds, source_labels
-from manipose_mj.ppf_jax.view_settings import view_setting
-from manipose_mj.ppf_jax.weights import LabelSet, MethodName
+from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors, summary
+from manipose_mj.ppf_jax.evaluation.pose_predictions import (
+    Predictions,
+    catalogue_hulls,
+    categories_of,
+    predict,
+)
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.weight_files import LabelSet, MethodName
 
 log = logging.getLogger("pose_table")
 
@@ -91,7 +96,7 @@ def rows_of(
             sources = frames if labels == "original" else None
             # The last batch is filled up, which costs a slow method most.
             batch = min(32, estimator.trained.model.at_once)
-            found = answers(estimator, clouds, batch=batch)
+            found = predict(estimator, clouds, batch=batch)
             yield _measured(category, name, labels, clouds, found, sources)
     shape = template(category) if matchers else None
     for name, matcher in matchers.items():
@@ -104,8 +109,8 @@ def rows_of(
             found = np.isfinite(pose).all()
             poses.append(pose if found else compose(np.eye(3), cloud.points.mean(axis=0)))
         none = np.full(len(clouds), np.nan)
-        answered = Answers(np.stack(poses), none, 1e3 * float(np.median(spent)))
-        yield _measured(category, name, "unified", clouds, answered, None)
+        predicted = Predictions(np.stack(poses), none, 1e3 * float(np.median(spent)))
+        yield _measured(category, name, "unified", clouds, predicted, None)
 
 
 def estimator_of(
@@ -122,7 +127,7 @@ def estimator_of(
     return None
 
 
-def _one_frame(clouds: Sequence[LabelledCloud], frames: dict[str, SourceLabel]) -> Answers:
+def _one_frame(clouds: Sequence[LabelledCloud], frames: dict[str, SourceLabel]) -> Predictions:
     """What knows every unified pose and says one source's frame for all objects: the best such frame.
 
     What no cloud tells is from which source an object is.
@@ -135,7 +140,7 @@ def _one_frame(clouds: Sequence[LabelledCloud], frames: dict[str, SourceLabel]) 
         found.append((round(errors.rotation.mean(), 4), errors.origin.mean(), poses))
     _, _, poses = min(found, key=lambda row: row[:2])
     none = np.full(len(clouds), np.nan)
-    return Answers(poses, none, float("nan"))
+    return Predictions(poses, none, float("nan"))
 
 
 def _measured(
@@ -143,7 +148,7 @@ def _measured(
     method: str,
     labels: str,
     clouds: Sequence[LabelledCloud],
-    found: Answers,
+    found: Predictions,
     sources: dict[str, SourceLabel] | None,
 ) -> Row:
     hulls = catalogue_hulls(clouds) if sources is None else None

@@ -46,7 +46,7 @@ def main(steps: int = 2000, seeds: int = 1, hold: int = 1, only: tuple[str, ...]
 
 def wander(domain: str, name: str, seed: int, steps: int, hold: int) -> tuple[float, str, str]:
     """The deepest contact [m], between what, and what broke: nothing, or a line."""
-    environment = suite.load(domain, name, seed=seed, observations="state+pose")
+    environment = suite.load(domain, name, seed=seed, obs_mode="state+pose")
     spec, specs = environment.action_spec(), environment.observation_spec()
     rng = np.random.default_rng(seed)
     deepest = [(0.0, "")]

@@ -1,49 +1,50 @@
-"""Draw the README's picture: the baseline storing the chips can, and a catalogue object at its goal.
+"""Film the README's picture: the baseline opens a drawer, lays the chips can inside and shuts it.
 
-python benchmarks/readme_picture.py docs/teaser.png
+python benchmarks/readme_picture.py docs/teaser.webp
 """
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import tyro
-from PIL import Image
 
-from manipose_mj.control.episode import run_episode, scene_model
-from manipose_mj.mjcf.pictures import painter
+from manipose_mj.evaluation.episode import run_episode, scene_model
+from manipose_mj.mjcf.cameras.pictures import painter
+from manipose_mj.mjcf.views.film import encode_animation
+from manipose_mj.tasks import EnvConfig, EpisodeSpec
 
-WIDTH, HEIGHT = 400, 300
-ROWS = (
-    ("articulated/store_chips_can_middle_drawer", 2, (0.0, 0.22, 0.63, 1.0)),
-    ("single_object/target_pose", 9, (0.0, 0.45, 0.72, 1.0)),
-)
+TASK, SEED = "articulated/store_chips_can_middle_drawer", 2
+WIDTH, HEIGHT = 480, 300
+FRAMES, LAST, FPS = 84, 12, 12.0  # the last frame stays for a second
+LIMIT = 1_000_000  # bytes
 
 
 def main(out: tyro.conf.Positional[Path]) -> None:
-    """Run one episode of each task and paste four moments of each into one PNG."""
-    rows = []
-    for task, seed, moments in ROWS:
-        result, trajectory = run_episode(task, episode=0, seed=seed)
-        if not result.success_at_end:
-            raise SystemExit(
-                f"{task} with seed {seed} failed: {result.reason}; choose another seed"
-            )
-        model = scene_model(task, seed=seed)
-        data = mujoco.MjData(model)
-        frames = []
-        with painter(model, HEIGHT, WIDTH, engine="ray") as paint:
-            for moment in moments:
-                data.qpos[:] = trajectory.qpos[round(moment * (len(trajectory.times) - 1))]
-                mujoco.mj_forward(model, data)
-                frames.append(paint.paint(data, "overview"))
-        rows.append(np.hstack(frames))
-    picture = io.BytesIO()
-    Image.fromarray(np.vstack(rows)).save(picture, "PNG", optimize=True)
-    out.write_bytes(picture.getvalue())
+    """Play one episode and write it as an animation that loops.
+
+    Args:
+      out: A WebP file; it stays below 1 MB.
+    """
+    start = EnvConfig(TASK, obs_mode="state"), EpisodeSpec(SEED)
+    result, trajectory = run_episode(*start)
+    if not result.success_at_end:
+        raise SystemExit(f"{TASK} with seed {SEED} failed: {result.reason}; choose another seed")
+    model = scene_model(*start)
+    data = mujoco.MjData(model)
+    frames = []
+    with painter(model, HEIGHT, WIDTH, engine="ray") as paint:
+        for frame in np.linspace(0, len(trajectory.times) - 1, FRAMES).round().astype(int):
+            data.qpos[:] = trajectory.qpos[frame]
+            mujoco.mj_forward(model, data)
+            frames.append(paint.paint(data, "overview"))
+    animation = encode_animation(frames + frames[-1:] * LAST, fps=FPS)
+    if len(animation) >= LIMIT:
+        raise SystemExit(f"{len(animation)} bytes; expected fewer than {LIMIT}")
+    out.write_bytes(animation)
+    print(f"{out}: {len(frames)} frames, {len(animation) / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

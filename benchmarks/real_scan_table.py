@@ -6,7 +6,7 @@
 
 Built assets are rendered as the catalogue is for the other tables. A scan is estimated by the network of
 its category where there is one that knows its symmetry, else by that of its label's type, or by both where the
-catalogue's things of its kind are round and it is not; one that has neither is left out with a line. With
+catalogue's objects of its kind are round and it is not; one that has neither is left out with a line. With
 `--weights DIR`, these are `DIR/NAME/weights.npz`, as `manipose pose train` writes them; without, the package's
 own. The bar is the paper's ManiPose column of the same category, or the mean over its two categories of the
 same type: the mean must not pass it, nor the median half of it; turns about the axis do not count where the
@@ -29,19 +29,19 @@ from rich.console import Console
 from rich.table import Table
 from scan_pictures import draw_view
 
-from asset_pipeline.asset_json import list_assets, read_asset
-from asset_pipeline.assets import Asset
-from asset_pipeline.catalogue import CATALOGUE
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
-from manipose_mj.ppf_jax.asset_views import views_of
-from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.data.asset_views import views_of
+from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.evaluation import answers
-from manipose_mj.ppf_jax.flattened import FlattenedEstimator
-from manipose_mj.ppf_jax.metrics import PoseErrors, pose_errors, summary
-from manipose_mj.ppf_jax.symmetry import common_symmetry
-from manipose_mj.ppf_jax.view_settings import ViewSetting, view_setting
+from manipose_mj.ppf_jax.evaluation.pose_metrics import PoseErrors, pose_errors, summary
+from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.symmetry import common_symmetry
+from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 log = logging.getLogger("real_scan_table")
 
@@ -82,7 +82,7 @@ class Row:
 
 def estimator_of(
     asset: Asset, weights: Path | None
-) -> tuple[str, PoseEstimator | FlattenedEstimator] | None:
+) -> tuple[str, PoseEstimator | TwoNetworkFusion] | None:
     """The network for an asset, with its name; None where there are no weights."""
     kind, row = asset.label.object_type, CATALOGUE.get(asset.category)
     names = [asset.category, kind] if row is not None and row.object_type == kind else [kind]
@@ -93,7 +93,7 @@ def estimator_of(
         if row is not None and (row.object_type, kind) == ("axial", "mirror"):
             upright = _network(asset.category, weights) or _network("axial", weights)
             if upright is not None:
-                return "axial, mirror", FlattenedEstimator(upright, estimator)
+                return "axial, mirror", TwoNetworkFusion(upright, estimator)
         # The package gives a category without weights its type's.
         only = estimator.trained.categories == (asset.category,)
         return (asset.category if only else kind), estimator
@@ -116,9 +116,9 @@ def fits(group: SymmetryGroup, estimator: PoseEstimator) -> bool:
     its axes are named.
     """
     learnt, own = estimator.trained.model.config.symmetry, common_symmetry([group])
-    wanted = (learnt.axial, learnt.unsigned_x, learnt.unsigned_y)
+    requested = (learnt.axial, learnt.unsigned_x, learnt.unsigned_y)
     has = (own.axial, own.unsigned_x, own.unsigned_y)
-    return all(b or not a for a, b in zip(wanted, has, strict=True))
+    return all(b or not a for a, b in zip(requested, has, strict=True))
 
 
 def bar_of(category: str, object_type: str) -> tuple[float, float]:
@@ -231,7 +231,7 @@ def measured(
             )
             continue
         seen = views_of(asset, setting, options.views)
-        found = answers(chosen[1], seen, timed=0)
+        found = predict(chosen[1], seen, timed=0)
         group = kind_symmetry(asset)
         errors = pose_errors(found.poses, [replace(cloud, symmetry=group) for cloud in seen])
         rows.append(row_of(asset, chosen[0], errors))

@@ -17,7 +17,7 @@ from scipy.stats import spearmanr
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.failure import StageFailure
+from manipose_mj.failures import StageFailure
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -65,7 +65,7 @@ def main() -> None:
 
 def _rewards(task: tuple[str, str], seed: int) -> np.ndarray | None:
     """The rewards of an episode; None if it fails."""
-    environment = suite.load(*task, seed=seed, observations="state", reward="dense")
+    environment = suite.load(*task, seed=seed, obs_mode="state", reward_mode="dense")
     environment.reset()
     rewards = []
     try:

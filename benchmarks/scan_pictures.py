@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 
 _COLOURS = ("tab:red", "tab:green", "tab:blue")  # X, Y, Z
 _PLANES = ((0, 1, "from the camera"), (2, 1, "from its right"))

@@ -14,11 +14,12 @@ import tyro
 from dm_control import composer
 from PIL import Image
 
-from manipose_mj import protocol, suite
+from manipose_mj import suite
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.protocol.freeze import builtin_tasks
 from manipose_mj.gym import env_id
-from manipose_mj.mjcf.pictures import render
-from manipose_mj.protocol.freeze import builtin_tasks
-from manipose_mj.tasks.registry import TaskSpec
+from manipose_mj.mjcf.cameras.pictures import render
+from manipose_mj.tasks.core.registry import TaskSpec
 
 SEED = 0  # of the episode whose start is drawn
 WIDTH, HEIGHT, COLOURS = 400, 300, 128
@@ -78,7 +79,7 @@ def card(spec: TaskSpec, environment: composer.Environment) -> str:
         "",
         "## Observations",
         "",
-        "With `state+pose`; images and clouds: see the README.",
+        "With `state+pose`; [Observations](../../guides/observations.md) explains the keys, images and clouds.",
         "",
     ]
     lines += ["| key | shape | type |", "| --- | --- | --- |"]
@@ -87,21 +88,39 @@ def card(spec: TaskSpec, environment: composer.Environment) -> str:
     return "\n".join(lines) + "\n"
 
 
+FAMILIES = {
+    "single_object": "Single objects",
+    "clutter": "Clutter",
+    "articulated": "Furniture",
+}
+HEAD = """# Tasks
+
+*Written by `python benchmarks/task_cards.py`.*
+
+Each card holds a task's goals, tolerances, objects, seeds and observations. [Protocol v1](../results/protocol_v1.md) holds the baseline's
+success rates.
+"""
+
+
 def index() -> str:
-    """The page that lists the cards."""
-    rows = [
-        f"| [`{spec.full_name}`]({spec.domain}/{spec.name}.md) | {spec.summary} |"
-        for spec in builtin_tasks()
-    ]
-    head = (
-        "# Tasks\n\n*Written by `python benchmarks/task_cards.py`.*\n\n| task | |\n| --- | --- |\n"
-    )
-    return head + "\n".join(sorted(rows)) + "\n"
+    """The gallery of the cards, by families."""
+    specs = sorted(builtin_tasks(), key=lambda spec: spec.full_name)
+    sections = [HEAD]
+    for domain, title in FAMILIES.items():
+        sections.append(f'## {title}\n\n<div class="gallery" markdown>\n')
+        sections += [
+            f"- [![{spec.name}]({domain}/{spec.name}.png)]({domain}/{spec.name}.md)\n\n"
+            f"    [`{spec.full_name}`]({domain}/{spec.name}.md)\n\n    {spec.summary}\n"
+            for spec in specs
+            if spec.domain == domain
+        ]
+        sections.append("</div>\n")
+    return "\n".join(sections)
 
 
 def built(spec: TaskSpec) -> composer.Environment:
     """The environment that a card describes, at the start of an episode."""
-    environment = suite.load(spec.domain, spec.name, seed=SEED, observations="state+pose")
+    environment = suite.load(spec.domain, spec.name, seed=SEED, obs_mode="state+pose")
     environment.reset()
     return environment
 

@@ -26,7 +26,7 @@ from dm_control import manipulation
 
 from manipose_mj import suite
 from manipose_mj.evaluation.statistics import machine
-from manipose_mj.tasks.observations import SensorConfig
+from manipose_mj.tasks.observations.sensors import SensorConfig
 
 RESETS = 30
 TURNS, STEPS = 40, 10
@@ -86,7 +86,7 @@ def _rates(runners: list[Runner]) -> dict[str, float]:
 
 
 def _ours(domain: str, task: str) -> Runner:
-    environment = suite.load(domain, task, seed=0, observations="state")
+    environment = suite.load(domain, task, seed=0, obs_mode="state")
     environment.reset()
     joints, opening = environment.task.robot.configuration(environment.physics)
     home, rng = np.append(joints, opening), np.random.default_rng(0)
@@ -163,11 +163,11 @@ def _gym_step(environment) -> None:
 def _cloud(domain: str, task: str) -> float:
     """Median time of the fused cloud [ms], every time of another moment."""
     environment = suite.load(
-        domain, task, seed=0, observations="pointcloud", sensors=SensorConfig(height=120, width=160)
+        domain, task, seed=0, obs_mode="pointcloud", sensors=SensorConfig(height=120, width=160)
     )
     environment.reset()
     joints, opening = environment.task.robot.configuration(environment.physics)
-    blind = suite.load(domain, task, seed=0, observations="state")
+    blind = suite.load(domain, task, seed=0, obs_mode="state")
     blind.reset()
     action, taken = np.append(joints, opening), []
     for _ in range(CLOUDS):
@@ -178,7 +178,7 @@ def _cloud(domain: str, task: str) -> float:
 
 def _growth(task: tuple[str, str], episodes: int) -> None:
     """Print how reset times and memory change over many episodes."""
-    environment = suite.load(*task, seed=0, observations="state")
+    environment = suite.load(*task, seed=0, obs_mode="state")
     environment.reset()
     resets, memory = [], []
     for _ in range(episodes):

@@ -18,17 +18,17 @@ import tyro
 from dm_control import composer
 from jaxtyping import Float
 
-from asset_pipeline import catalogue
 from manipose_mj import suite
+from manipose_mj.actions import CONTROL_MODES
+from manipose_mj.actions.tcp_motion import euler_angles
+from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.conversion import convert
-from manipose_mj.control.failure import StageFailure
-from manipose_mj.control.line_motion import LineConfig, line_poses
-from manipose_mj.control.modes import CONTROL_MODES
-from manipose_mj.control.modes.tcp_motion import euler_angles
-from manipose_mj.control.recording import Recording, record
+from manipose_mj.control.conversion.convert import convert
+from manipose_mj.control.conversion.recording import Recording, record
+from manipose_mj.control.motion.line_motion import LineConfig, line_poses
 from manipose_mj.evaluation.statistics import machine, wilson_interval
-from manipose_mj.mjcf.panda import MAX_OPENING
+from manipose_mj.failures import StageFailure
+from manipose_mj.mjcf.panda.robot import MAX_OPENING
 
 TASK = ("single_object", "target_pose")
 CANNOT_TURN = ("pd_ee_delta_pos", "pd_ee_target_delta_pos")
@@ -55,13 +55,13 @@ def main(arguments: Arguments) -> None:
     )
     print("| --- | --- | --- | --- | --- | --- |")
     if "baseline" in arguments.kinds:
-        environment = suite.load(*TASK, seed=0, observations="state")
+        environment = suite.load(*TASK, seed=0, obs_mode="state")
         able = tuple(mode for mode in arguments.modes if mode not in CANNOT_TURN)
         recordings = baseline_successes(environment, arguments.first)
         _rows("baseline", environment, recordings, able, arguments.episodes)
     if "carry" in arguments.kinds:
         cans = [catalogue.load("chips_can", index) for index in (0, 1)]
-        environment = suite.load(*TASK, seed=0, observations="state", objects=cans)
+        environment = suite.load(*TASK, seed=0, obs_mode="state", objects=cans)
         recordings = straight_carries(environment, arguments.first)
         _rows("carry", environment, recordings, arguments.modes, arguments.episodes)
 

@@ -25,18 +25,18 @@ from rich.console import Console
 from rich.table import Table
 
 from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
+from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.evaluation import RIGID_TYPES, answers, categories_of
-from manipose_mj.ppf_jax.metrics import most_confident, pose_errors, summary
-from manipose_mj.ppf_jax.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.view_settings import ViewSetting, view_setting
+from manipose_mj.ppf_jax.evaluation.pose_metrics import most_confident, pose_errors, summary
+from manipose_mj.ppf_jax.evaluation.pose_predictions import RIGID_TYPES, categories_of, predict
 
 BAR_DEG, BAR_CM, BAR_UNSEEN = 2.5, 0.4, 2.0
 KEPT = 0.8  # share of the views that the network is surest of
-# Six categories of each type, each with a relative that stays: what has to carry over is the rule by which
+# Six categories of each type, each with a similar category that stays: what has to carry over is the rule by which
 # frames are named, to a shape that has never been seen under it.
 LEFT_OUT: dict[str, tuple[str, ...]] = {
-    # In the order of the relatives: can; flower pot, twice; can and candle; apple; bottle.
+    # In the order of the similar categories: can; flower pot, twice; can and candle; apple; bottle.
     "axial": ("chips_can", "cup", "trash_bin", "jar", "pear", "thermos"),
     # Mug and teapot; pot and tissue; box; notebook; hat; computer mouse.
     "mirror": ("pitcher", "container", "drinkbox", "wallet", "helmet", "remote"),
@@ -92,7 +92,7 @@ def rows_of(
     rows = []
     for category in categories_of(object_type):
         clouds = catalogue_clouds(category, "test", setting, views=views, jobs=jobs)
-        found = answers(estimator, clouds, timed=0)
+        found = predict(estimator, clouds, timed=0)
         errors = pose_errors(found.poses, clouds)
         figures = summary(errors)
         sure = summary(errors.of(most_confident(found.confidence, KEPT)))

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 import dm_env
 import numpy as np
 from dm_control import composer
 
-from asset_pipeline.assets import Asset
-from asset_pipeline.catalogue import Split
-from manipose_mj.errors import unknown_name
-from manipose_mj.tasks import builtin  # noqa: F401  (registers the tasks)
-from manipose_mj.tasks.environment import TaskEnvironment
-from manipose_mj.tasks.observations import SensorConfig
-from manipose_mj.tasks.options import Reward, TaskOptions
-from manipose_mj.tasks.registry import TaskSpec, all_tasks, on_registration, task_spec
+from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions
+from manipose_mj.tasks.core.environment import TaskEnvironment
+from manipose_mj.tasks.core.registry import (
+    TaskSpec,
+    all_tasks,
+    named_task,
+    on_registration,
+    task_spec,
+)
 
 ALL_TASKS: tuple[tuple[str, str], ...]  # always those of now: see __getattr__
 
@@ -34,14 +36,8 @@ def load(
     task: str,
     seed: int | np.random.RandomState | None = None,
     *,
-    observations: str = "state+pose",
-    sensors: SensorConfig | None = None,
-    control_mode: str = "pd_joint_pos",
-    objects: Sequence[Asset] | None = None,
-    split: Split = "train",
-    reward: Reward = "sparse",
-    randomisation: str = "none",
     environment_kwargs: dict[str, Any] | None = None,
+    **config: Unpack[EnvOptions],
 ) -> composer.Environment:
     """The environment of a registered task.
 
@@ -49,74 +45,48 @@ def load(
       domain: `"single_object"`, `"clutter"`, `"articulated"`, or one of your own.
       task: A task of that domain, as in `ALL_TASKS`.
       seed: Of the environment's one random state; episodes follow from it.
-      observations: Any `+` combination of observation modes, such as `"state+pose+pointcloud"`.
-      sensors: Cameras, image size and cloud size.
-      control_mode: What actions mean, such as `"pd_joint_pos"`, `"pd_ee_delta_pose"` or `"primitive"`;
-        the physics is the same for all.
-      objects: Assets to use instead of the built-in ones.
-      split: Which built-in objects, train or test.
-      reward: `"sparse"` or `"dense"`.
-      randomisation: Strength of domain randomisation.
       environment_kwargs: More arguments of `composer.Environment`.
+      **config: Fields of `EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`, `objects`, `split`,
+        `randomisation`, `sensors`.
 
     Raises:
       InputError: An unknown task, observation or control mode, or objects that the task cannot use.
     """
     spec = task_spec(domain, task)
-    return load_spec(
-        spec,
-        seed,
-        observations=observations,
-        sensors=sensors or SensorConfig(),
-        control_mode=control_mode,
-        objects=None if objects is None else tuple(objects),
-        split=split,
-        reward=reward,
-        randomisation=randomisation,
-        environment_kwargs=environment_kwargs or {},
-    )
+    return make(EnvConfig(spec.full_name, **config), seed, environment_kwargs=environment_kwargs)
 
 
-def load_spec(
-    spec: TaskSpec,
-    seed: int | np.random.RandomState | None,
+def make(
+    config: EnvConfig,
+    seed: int | np.random.RandomState | None = None,
     *,
-    control_mode: str,
-    environment_kwargs: dict[str, Any],
-    **options: Any,
+    environment_kwargs: dict[str, Any] | None = None,
 ) -> composer.Environment:
-    """The environment of a task that need not be registered in this process; arguments as for `load`."""
-    from manipose_mj.control.modes import CONTROL_MODES
-    from manipose_mj.control.modes import control_mode as mode_named
+    """The environment that a configuration describes; arguments as for `load`."""
+    spec = named_task(config.task)
+    return _made(spec, config, seed, environment_kwargs or {})
 
-    if control_mode not in (*CONTROL_MODES, "primitive"):
-        raise unknown_name("control mode", control_mode, (*CONTROL_MODES, "primitive"))
-    if control_mode == "primitive":
-        from manipose_mj.control.modes.primitive import PrimitiveEnvironment
 
-        moving = load_spec(
-            spec,
-            seed,
-            control_mode="pd_joint_pos",
-            environment_kwargs=environment_kwargs,
-            **options,
-        )
-        return PrimitiveEnvironment(moving)
-    task = spec.factory(TaskOptions(action_mode=mode_named(control_mode), **options))
-    again = partial(
-        load_spec,
-        spec,
-        None,
-        control_mode=control_mode,
-        environment_kwargs=environment_kwargs,
-        **options,
-    )
+def _made(
+    spec: TaskSpec,
+    config: EnvConfig,
+    seed: int | np.random.RandomState | None,
+    environment_kwargs: dict[str, Any],
+) -> composer.Environment:
+    if config.control_mode == PRIMITIVE:
+        from manipose_mj.control.primitive_mode.environment import PrimitiveEnvironment
+
+        moving = replace(config, control_mode="pd_joint_pos")
+        return PrimitiveEnvironment(_made(spec, moving, seed, environment_kwargs))
+    task = spec.factory(config)
     arguments: dict[str, Any] = {
         "time_limit": task.config.horizon,
         "random_state": seed,
         "strip_singleton_obs_buffer_dim": True,
         "recompile_mjcf_every_episode": False,
     }
+    # The specification knows its module: a process that loads a pickled environment registers the task.
+    again = partial(_made, spec, config, None, environment_kwargs)
     return TaskEnvironment(task, rebuild=again, **{**arguments, **environment_kwargs})
 
 

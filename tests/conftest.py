@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests import tiers
+from tests.array_checks import install_array_checks
 
 # Before NumPy loads: xdist gives every core a worker, and threads on top only slow each other down.
 for _library in ("OPENBLAS", "OMP", "MKL"):
@@ -21,23 +23,30 @@ os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
 
-# Files whose tests take long though they are few.
-_LONG = (
-    "test_shipped_furniture",
-    "test_shipped_weights",
-    "test_training",
-    "test_shipped_types",
-    "test_pose_table",
-)
+install_array_checks()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the markers of the tiers."""
+    for marker in tiers.MARKERS:
+        config.addinivalue_line("markers", marker)
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects by what is marked here
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long files first, then those of many tests, so that the workers end at about the same time.
+    """Mark what samples leave out, and put long files first."""
+    tiers.mark_left_out(items)
+    tiers.order(items)
 
-    In the order that pytest-xdist would choose itself, a file of one test comes last, however long it takes.
-    """
-    tests = Counter(item.path for item in items)
-    items.sort(key=lambda item: (item.path.stem not in _LONG, -tests[item.path], item.path))
+
+@pytest.fixture
+def wrong_arrays() -> Iterator[None]:
+    """Arrays that are not as declared reach the function, which is to refuse them itself."""
+    from jaxtyping import config
+
+    config.update("jaxtyping_disable", True)
+    yield
+    config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture

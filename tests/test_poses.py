@@ -96,7 +96,7 @@ def test_translation_error_is_between_origins_whatever_the_symmetry():
         assert rotation == pytest.approx(0, abs=1e-7)
 
 
-# A turn of the estimate in the label frame, and what is left of it under each group [deg].
+# A turn of the estimate in the label frame, and what remains of it under each group [deg].
 CLOSED_FORMS = [
     ("identity", X, 180, 180),
     ("identity", Z, 40, 40),
@@ -122,12 +122,12 @@ CLOSED_FORMS = [
 ]
 
 
-@pytest.mark.parametrize(("group", "axis", "turn", "left"), CLOSED_FORMS)
-def test_rotation_error_is_what_the_symmetry_leaves(group, axis, turn, left):
+@pytest.mark.parametrize(("group", "axis", "turn", "remaining"), CLOSED_FORMS)
+def test_rotation_error_is_what_the_symmetry_leaves(group, axis, turn, remaining):
     truth = _poses(seed=3)
     estimate = truth @ compose(rotation_about(axis, radians(turn)), np.zeros(3))
     _, rotation = pose_error(estimate, truth, GROUPS[group])
-    assert np.degrees(rotation) == pytest.approx(left, abs=1e-5)
+    assert np.degrees(rotation) == pytest.approx(remaining, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", ["axial", "axial, ends alike"])
@@ -201,3 +201,34 @@ def test_jax_converts_as_numpy_does():
     np.testing.assert_allclose(moved, poses.transform(pose, points), atol=1e-5)
     vectors = poses.pose_to_vector(given)
     np.testing.assert_allclose(poses.vector_to_pose(vectors), pose, atol=1e-5)
+
+
+def test_padding_a_group_changes_no_error():
+    estimate, truth = _poses(10, seed=12), _poses(10, seed=13)
+    for group in GROUPS.values():
+        padded = group.padded(len(group.rotations) + 3)
+        assert padded.axial == group.axial and len(padded.rotations) == len(group.rotations) + 3
+        for own, other in zip(
+            pose_error(estimate, truth, group), pose_error(estimate, truth, padded), strict=True
+        ):
+            np.testing.assert_array_equal(own, other)
+    with pytest.raises(ValueError, match="a group of 4 does not fit into 2"):
+        GROUPS["three planes"].padded(2)
+
+
+@pytest.mark.parametrize("how", ["numpy", "jit", "vmap"])
+def test_every_world_has_a_symmetry_of_its_own(how):
+    estimate, truth = _poses(len(GROUPS), seed=14), _poses(len(GROUPS), seed=15)
+    groups = SymmetryGroup.stack(list(GROUPS.values()))
+    assert groups.rotations.shape == (6, 8, 3, 3) and groups.axial.tolist()[:3] == [0, 1, 1]
+    if how == "numpy":
+        found, tolerance = pose_error(estimate, truth, groups), 0.0
+    else:
+        jax = pytest.importorskip("jax")
+        from manipose_mj.tasks import pytrees as _  # noqa: F401
+
+        run = jax.jit(pose_error) if how == "jit" else jax.jit(jax.vmap(pose_error))
+        found, tolerance = run(estimate, truth, groups), 1e-5
+    for i, group in enumerate(GROUPS.values()):
+        single = pose_error(estimate[i], truth[i], group)
+        np.testing.assert_allclose([error[i] for error in found], single, rtol=0, atol=tolerance)

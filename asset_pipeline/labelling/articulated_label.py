@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 
-from asset_pipeline.geometry import Body
-from asset_pipeline.labelling.label import PoseLabel
+from manipose_mj.assets.geometry import Body
+from manipose_mj.assets.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup
 
 

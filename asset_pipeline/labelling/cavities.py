@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull
 
-from asset_pipeline.assets import Cavity
-from asset_pipeline.geometry import Shape
+from manipose_mj.assets.asset import Cavity
+from manipose_mj.assets.geometry import Shape
 
 PITCH = 0.005  # of the columns [m]
 LARGE = 140  # cells along the longest side at most; larger things get larger cells

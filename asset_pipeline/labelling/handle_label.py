@@ -7,8 +7,8 @@ import trimesh
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.surface_points import surface_points
+from asset_pipeline.geometry.surface_points import surface_points
+from manipose_mj.assets.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,13 +8,13 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.labelling.axial_frame import axial_label
-from asset_pipeline.labelling.label import ObjectType, PoseLabel
-from asset_pipeline.labelling.label_quality import LabelQuality
-from asset_pipeline.labelling.mirror_frame import mirror_label
+from asset_pipeline.labelling.axial_label import axial_label
+from asset_pipeline.labelling.mirror_label import mirror_label
 from asset_pipeline.labelling.print_symmetry import surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
-from asset_pipeline.labelling.tool_frame import tool_label
+from asset_pipeline.labelling.tool_label import tool_label
+from manipose_mj.assets.label import ObjectType, PoseLabel
+from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 
 
@@ -30,7 +30,7 @@ def scan_label(
 ) -> tuple[PoseLabel, LabelQuality]:
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
-    The frame is measured: `axial_frame`, `mirror_frame` and `tool_frame` say how, and what they do
+    The frame is measured: `axial_label`, `mirror_label` and `tool_label` say how, and what they do
     where the rules leave something open.
 
     Args:
@@ -38,8 +38,8 @@ def scan_label(
       object_type: `"axial"`, `"mirror"` or `"functional"`.
       up: `(3,)`, in the mesh frame, to within about 10 degrees; None only for functional objects,
         which do not need it.
-      category: What kind of thing it is; tells which end of a tool is held. Unknown ones get the
-        rule of `tool_frame`.
+      category: What kind of object it is; tells which end of a tool is held. Unknown ones get the
+        rule of `tool_label`.
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
       textured: Whether the asset has a texture, which is taken to tell the ends of an axial object
         apart.

@@ -56,8 +56,8 @@ class SurfaceCloud:
         variances, axes = np.linalg.eigh(np.swapaxes(share * offsets, 1, 2) @ offsets)
         normals = axes[:, :, 0]
         outward = (share * facing[near]).sum(axis=1)
-        flipped = np.einsum("ni,ni->n", normals, outward) < 0
-        normals = np.where(flipped[:, None], -normals, normals)
+        inward = np.einsum("ni,ni->n", normals, outward) < 0
+        normals = np.where(inward[:, None], -normals, normals)
         height = np.einsum("ni,ni->n", samples - middle, normals)
         points = samples - height[:, None] * normals
         flatness = 1 - np.sqrt(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.sheet import sheet
-from asset_pipeline.procedural.specimen import Colour
+from asset_pipeline.procedural.specimen import Colour, uniform
 
 STEEL, PLASTIC = 7850.0, 1100.0  # [kg/m^3]
 STEEL_GREY: Colour = (0.74, 0.75, 0.77, 1.0)
@@ -36,7 +37,21 @@ class FlatHandle:
     round: float = 1.0
 
 
-def drawn_handle(
+class Cutlery(Protocol):
+    """A fork or a spoon: a dataclass with a handle, besides `wall`, `density` and `rgba`."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def handle(self) -> FlatHandle:
+        """What the hand holds."""
+        ...
+
+
+Tool = TypeVar("Tool", bound=Cutlery)
+
+
+def sample_handle(
     rng: np.random.Generator,
     *,
     length: float,
@@ -50,14 +65,15 @@ def drawn_handle(
         end=end,
         neck=neck,
         waist=round(float(rng.uniform(0.55, 0.95)), 3),
-        thick=round(float(rng.uniform(*thick)), 4),
+        thick=uniform(rng, *thick),
         round=round(float(rng.choice((0.35, 0.7, 1.0, 1.5))), 2),
     )
 
 
-def moulded_handle(handle: FlatHandle) -> FlatHandle:
-    """The same in plastic, which takes more material: wider at the neck and thicker."""
-    return replace(handle, neck=handle.neck + 0.002, thick=handle.thick + 0.001)
+def in_plastic(tool: Tool, colour: Colour) -> Tool:
+    """The same fork or spoon in plastic, which takes more material: the neck wider, handle and wall thicker."""
+    handle = replace(tool.handle, neck=tool.handle.neck + 0.002, thick=tool.handle.thick + 0.001)
+    return replace(tool, handle=handle, wall=0.0026, density=PLASTIC, rgba=colour)
 
 
 def flat_handle(handle: FlatHandle, *, rgba: Colour, density: float) -> Piece:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.moulded import printed, rectangle
 from asset_pipeline.procedural.solids import ellipse
 from asset_pipeline.procedural.specimen import Colour
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose, rotation_about
 
 RED: Colour = (0.80, 0.14, 0.12, 1.0)

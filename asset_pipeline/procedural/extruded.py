@@ -7,10 +7,10 @@ import shapely
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, solid_piece
 from asset_pipeline.procedural.revolution import MAX_PART_VERTICES, convex_part
 from asset_pipeline.procedural.specimen import Colour
+from manipose_mj.assets.geometry import Shape
 
 MAX_CORNERS = MAX_PART_VERTICES // 2
 _CONVEX = 1e-4  # how much of its hull's area a polygon may miss and still count as convex

@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.revolution import revolved_mass
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.turned import banded, stacked_parts
+from manipose_mj.assets.geometry import Shape
 
 LEVEL = 1e-5  # a rise less than this is a flat [m]
 

@@ -8,13 +8,13 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.extruded import MAX_CORNERS
-from asset_pipeline.procedural.handles import loop_hulls
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.solids import loft, print_on_face
 from asset_pipeline.procedural.specimen import Colour
+from asset_pipeline.procedural.tool_handles import loop_hulls
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose
 
 EDGE_STEPS = 4  # segments of a rounded edge

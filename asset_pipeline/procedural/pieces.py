@@ -10,11 +10,11 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.assets import Area
-from asset_pipeline.geometry import Body, MassProperties, Shape
-from asset_pipeline.labelling.label import ObjectType, PoseLabel
-from asset_pipeline.mass import combine, solid_mass_properties
+from asset_pipeline.geometry.mass import combine, solid_mass_properties
 from asset_pipeline.procedural.specimen import Colour, Specimen
+from manipose_mj.assets.asset import Area
+from manipose_mj.assets.geometry import Body, MassProperties, Shape
+from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.poses import SymmetryGroup, compose, transform
 
 # Columns X, Y, Z of an upright object whose Y is the frame's x: X is up.

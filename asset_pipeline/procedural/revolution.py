@@ -12,7 +12,7 @@ import trimesh
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from asset_pipeline.geometry import MassProperties, Shape
+from manipose_mj.assets.geometry import MassProperties, Shape
 
 MAX_PART_VERTICES = 32
 
@@ -99,13 +99,13 @@ def revolved_mass(profile: Float[np.ndarray, "n 2"], density: float) -> MassProp
     r, z = at[..., 0], at[..., 1]
     dz = weights * (ends - profile)[:, 1:2]
 
-    def moment(a: int, b: int) -> float:
+    def integral(a: int, b: int) -> float:
         return float(2 * np.pi * density * np.sum(r ** (a + 1) / (a + 1) * z**b * dz))
 
-    mass = moment(1, 0)
-    height = moment(1, 1) / mass
-    vertical = moment(3, 0)
-    horizontal = vertical / 2 + moment(1, 2) - mass * height**2
+    mass = integral(1, 0)
+    height = integral(1, 1) / mass
+    vertical = integral(3, 0)
+    horizontal = vertical / 2 + integral(1, 2) - mass * height**2
     return MassProperties(
         mass, np.array([0.0, 0.0, height]), np.diag([horizontal, horizontal, vertical])
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.swept import loft_outwards
+from manipose_mj.assets.geometry import Shape
 
 
 def sheet(

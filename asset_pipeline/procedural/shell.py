@@ -8,12 +8,12 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import loft
 from asset_pipeline.procedural.specimen import Colour
+from manipose_mj.assets.geometry import Shape
 
 FLOOR_CORNERS = 16
 ARC_POINTS = 4  # of a wall part's outer side, along each ring
@@ -55,19 +55,19 @@ def shell_piece(
     if closed.volume < 0:
         rings = rings[:, ::-1]
         closed = loft(rings)
-    looks, start = [], 0
+    visuals, start = [], 0
     for number, (stop, rgba) in enumerate(colours):
         last = len(outer) if number == len(colours) - 1 else stop
         mesh = loft(rings[start : last + 1], caps=(start == 0, False))
-        looks.append(Shape("mesh", mesh=mesh, rgba=rgba))
+        visuals.append(Shape("mesh", mesh=mesh, rgba=rgba))
         start = last
-    looks.append(Shape("mesh", mesh=loft(rings[start:], caps=(False, True)), rgba=inside))
+    visuals.append(Shape("mesh", mesh=loft(rings[start:], caps=(False, True)), rgba=inside))
     parts = wall_parts(outer, inner, cuts, wedges)
     if floor:
         step = outer.shape[1] // FLOOR_CORNERS
         parts = (convex_part(np.concatenate([outer[0, ::step], inner[0, ::step]])), *parts)
     mass = solid_mass_properties(closed, density * float(closed.volume))
-    return Piece(tuple(looks), parts, mass)
+    return Piece(tuple(visuals), parts, mass)
 
 
 def wall_parts(
@@ -101,7 +101,7 @@ def wall_parts(
 
 
 def _sagitta(
-    corners: Float[np.ndarray, "2 w+1 3"], middles: Float[np.ndarray, "w 3"]
+    corners: Float[np.ndarray, "2 edges 3"], middles: Float[np.ndarray, "w 3"]
 ) -> Float[np.ndarray, "w 3"]:
     """How far the middle of each piece of a band lies off the plane of its four corners."""
     normals = np.cross(corners[1, 1:] - corners[0, :-1], corners[1, :-1] - corners[0, 1:])

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.moulded import facing, raised
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.solids import ellipse
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.swept import bar
+from manipose_mj.assets.geometry import Shape
 
 THICKNESS = 0.0028  # [m]
 BUTTON = (0.0058, 0.0022)  # radius and height [m]

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
+from manipose_mj.assets.geometry import Shape
 
 # How far a print stands off the surface it is on [m]; renderers need some.
 PRINT_THICKNESS = 1e-4

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from asset_pipeline.assets import Area, MovingPart
-from asset_pipeline.geometry import Body
-from asset_pipeline.labelling.label import PoseLabel
+from manipose_mj.assets.asset import Area, MovingPart
+from manipose_mj.assets.geometry import Body
+from manipose_mj.assets.label import PoseLabel
 
 _Choice = TypeVar("_Choice")
 Colour = tuple[float, float, float, float]
@@ -38,8 +38,8 @@ def specimen_rng(category: str, index: int) -> np.random.Generator:
     return np.random.default_rng([zlib.crc32(category.encode()), index])
 
 
-def drawn(rng: np.random.Generator, low: float, high: float) -> float:
-    """A size [m] or share drawn evenly from a range, to the fourth decimal."""
+def uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A size [m] or share, uniform over a range and rounded to the fourth decimal."""
     return round(float(rng.uniform(low, high)), 4)
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, solid_piece
 from asset_pipeline.procedural.revolution import MAX_PART_VERTICES, convex_part
 from asset_pipeline.procedural.solids import loft
 from asset_pipeline.procedural.specimen import Colour
+from manipose_mj.assets.geometry import Shape
 
 LOOP_POINTS = 20
 

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.labelling.functional_rule import functional_rotation
+from asset_pipeline.labelling.tool_axes import functional_rotation
 from asset_pipeline.procedural.pieces import ROLLING, AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.specimen import Specimen
 from manipose_mj.poses import SymmetryGroup

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.revolution import convex_part, lathe, revolved_mass
 from asset_pipeline.procedural.specimen import Colour
+from manipose_mj.assets.geometry import Shape
 
 RING_CORNERS = 16
 _EVEN = 1e-6  # radii closer than this make a cylinder [m]

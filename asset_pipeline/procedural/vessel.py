@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass, wall_wedges
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.turned import banded
+from manipose_mj.assets.geometry import Shape
 
 CURVE_POINTS = 24
 ARC = 5  # segments of a rounding
@@ -32,7 +32,7 @@ class Wall:
     """
 
     outer: Float[np.ndarray, "n 2"]
-    inner: Float[np.ndarray, "n 2"]
+    inner: Float[np.ndarray, "m 2"]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from asset_pipeline.catalogue import CATALOGUE
-from asset_pipeline.labelling.label import ObjectType
+from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.label import ObjectType
 
 # The rule for what nobody placed: it asks for nothing but an up axis, and the group is measured anyway.
 FALLBACK_TYPE: ObjectType = "mirror"

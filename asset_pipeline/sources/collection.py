@@ -13,12 +13,12 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import trimesh
 
-from asset_pipeline.assets import Provenance
-from asset_pipeline.scan import Scan, ScanItem, load_scan_mesh, sha256
-from asset_pipeline.sources import archives
 from asset_pipeline.sources.categories import Kind
-from asset_pipeline.sources.ply_rows import check_rows
-from asset_pipeline.sources.wavefront_lines import read_lines
+from asset_pipeline.sources.files import archives
+from asset_pipeline.sources.files.ply_rows import check_rows
+from asset_pipeline.sources.files.wavefront_lines import read_lines
+from asset_pipeline.sources.scan import Scan, ScanItem, load_scan_mesh, sha256
+from manipose_mj.assets.asset import Provenance
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -187,8 +187,8 @@ def load_mesh(item: ScanItem, folder: Path, *, unit: float = 1.0) -> trimesh.Tri
     path = folder / item.member
     try:
         if path.suffix.lower() == ".obj":
-            if doubts := read_lines(path, max_bytes=archives.MAX_FILE_BYTES).doubts:
-                log.warning("%s: %s", path, "; ".join(doubts))
+            if defects := read_lines(path, max_bytes=archives.MAX_FILE_BYTES).defects:
+                log.warning("%s: %s", path, "; ".join(defects))
         elif path.suffix.lower() == ".ply":
             check_rows(path)
         return load_scan_mesh(path, unit=unit)

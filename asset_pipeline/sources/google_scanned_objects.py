@@ -12,9 +12,9 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 
-from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of_product
+from asset_pipeline.sources.scan import Scan, ScanItem
 
 SOURCE = "Google Scanned Objects"
 LICENCE = "CC BY 4.0"

@@ -13,9 +13,9 @@ import re
 from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 
-from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of
+from asset_pipeline.sources.scan import Scan, ScanItem
 
 SOURCE = "OmniObject3D, raw scans"
 LICENCE = "CC BY 4.0"
@@ -44,7 +44,7 @@ def inputs(item: ScanItem) -> dict[str, str]:
 
 
 def opened(item: ScanItem) -> AbstractContextManager[Scan]:
-    """Read one object; its texture stays there as long as the context does.
+    """Read one object, millimetres made metres; its texture stays there as long as the context does.
 
     Raises:
       InputError: The archive or the mesh in it cannot be used.

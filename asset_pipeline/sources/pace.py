@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from asset_pipeline.assets import Provenance
-from asset_pipeline.scan import Scan, ScanItem
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import Kind, kind_of
-from asset_pipeline.sources.ply_rows import read_header
-from asset_pipeline.sources.ply_texture import texture_name
+from asset_pipeline.sources.files.ply_rows import read_header
+from asset_pipeline.sources.files.ply_texture import texture_name
+from asset_pipeline.sources.scan import Scan, ScanItem
+from manipose_mj.assets.asset import Provenance
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)

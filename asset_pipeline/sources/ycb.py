@@ -16,12 +16,12 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.assets import Provenance
-from asset_pipeline.labelling.label import ObjectType
-from asset_pipeline.scan import Scan, ScanItem, sha256
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.categories import kind_of
-from asset_pipeline.sources.wavefront_materials import read_materials
+from asset_pipeline.sources.files.wavefront_materials import read_materials
+from asset_pipeline.sources.scan import Scan, ScanItem, sha256
+from manipose_mj.assets.asset import Provenance
+from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -185,8 +185,8 @@ def opened(item: ScanItem) -> Iterator[Scan]:
     if len(found) != 1:
         raise InputError(f"{item.path}: holds {len(found)} meshes; expected one <id>/{MESH}")
     mesh = PurePosixPath(found[0])
-    wanted = [mesh, mesh.with_name(TEXTURE), mesh.with_name(LIBRARY)]
-    with collection.unpacked(item, wanted) as folder:
+    members = [mesh, mesh.with_name(TEXTURE), mesh.with_name(LIBRARY)]
+    with collection.unpacked(item, members) as folder:
         yield _scan(item, folder, Path(mesh))
 
 
@@ -208,7 +208,7 @@ def _scan(item: ScanItem, folder: Path, member: Path) -> Scan:
         mass=None if entry.grams is None else entry.grams / 1000,
         provenance=Provenance(SOURCE, item.name, LICENCE, inputs(item)),
         fill=entry.fill,
-        functional=None if entry.functional is None else np.array(entry.functional),
+        functional=None if entry.functional is None else np.array(entry.functional, float),
     )
 
 

@@ -1,0 +1,1 @@
+"""The command `manipose`, one module for each subcommand."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from asset_pipeline.assets import Asset
+    from manipose_mj.assets.asset import Asset
 
 
 def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
@@ -21,8 +21,8 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
     """
     import joblib
 
-    from asset_pipeline import catalogue
-    from manipose_mj.cli import output
+    from manipose_mj.assets import catalogue
+    from manipose_mj.console import output
 
     missing = [name for name in names if not catalogue.is_built(*catalogue.find(name))]
     if missing:
@@ -34,13 +34,6 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
     return [catalogue.load_by_name(name) for name in names]
 
 
-def all_names() -> list[str]:
-    """Of every built-in object."""
-    from asset_pipeline import catalogue
-
-    return [name for name, _ in catalogue.entries()]
-
-
 def names_in_tasks(tasks: Sequence[str], split: str = "train") -> list[str]:
     """Of the built-in objects that tasks put into their scenes.
 
@@ -48,7 +41,7 @@ def names_in_tasks(tasks: Sequence[str], split: str = "train") -> list[str]:
       tasks: `"domain/task"` names; those of other packages look after their objects themselves.
       split: Which of the two sets of objects.
     """
-    from manipose_mj import protocol
+    from manipose_mj.evaluation import protocol
 
     frozen = protocol.load(protocol.VERSIONS[-1]).tasks
     fields = [frozen[task] for task in tasks if task in frozen]

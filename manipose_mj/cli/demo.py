@@ -8,7 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from manipose_mj.cli.evaluate import run_and_report
-from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, one_thread_per_process
 
 # Of every family, the paper's experiments first.
 TASKS = (

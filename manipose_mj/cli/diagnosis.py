@@ -48,16 +48,16 @@ def _system() -> Iterator[Finding]:
 
     version = platform.python_version()
     try:
-        wanted = importlib.metadata.metadata(DISTRIBUTION)["Requires-Python"] or ""
+        requested = importlib.metadata.metadata(DISTRIBUTION)["Requires-Python"] or ""
     except importlib.metadata.PackageNotFoundError:
         yield Finding("system", DISTRIBUTION, "missing", "run `pip install .` in its folder")
         return
-    good = SpecifierSet(wanted).contains(version)
+    good = SpecifierSet(requested).contains(version)
     yield Finding(
         "system",
         "python",
         "ok" if good else "missing",
-        f"{version}" if good else f"{version}, but {wanted} is needed",
+        f"{version}" if good else f"{version}, but {requested} is needed",
     )
     yield Finding("system", "machine", "ok", f"{machine()}, {platform.system()}")
 
@@ -73,21 +73,21 @@ def _packages() -> Iterator[Finding]:
     for requirement in map(Requirement, lines):
         if requirement.marker is not None and not requirement.marker.evaluate({"extra": ""}):
             continue
-        name, wanted = requirement.name, requirement.specifier
+        name, requested = requirement.name, requirement.specifier
         try:
             version = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            yield Finding("packages", name, "missing", f'pip install "{name}{wanted}"')
+            yield Finding("packages", name, "missing", f'pip install "{name}{requested}"')
             continue
-        if wanted.contains(version, prereleases=True):
+        if requested.contains(version, prereleases=True):
             yield Finding("packages", name, "ok", version)
         else:
-            advice = f'{version} is not in the tested range; pip install "{name}{wanted}"'
+            advice = f'{version} is not in the tested range; pip install "{name}{requested}"'
             yield Finding("packages", name, "missing", advice)
 
 
 def _renderers() -> Iterator[Finding]:
-    from manipose_mj.mjcf import gl
+    from manipose_mj.mjcf.cameras import gl
 
     yield Finding("renderers", "ray caster", "ok", "depth, segmentation, clouds and plain pictures")
     for status in gl.probe_all():
@@ -131,7 +131,7 @@ def _mujoco_rollout() -> str:
     import numpy as np
     from mujoco import rollout
 
-    from manipose_mj.cli.process import CORES
+    from manipose_mj.console.process import CORES
 
     model = mujoco.MjModel.from_xml_string(_SCENE)
     data = [mujoco.MjData(model) for _ in range(CORES)]
@@ -175,7 +175,7 @@ def _require(*modules: str) -> None:
 
 def _visuals() -> Finding:
     """Menagerie's meshes, which only make pictures nicer."""
-    from manipose_mj.mjcf.panda_menagerie import find_menagerie_panda
+    from manipose_mj.mjcf.panda.menagerie import find_menagerie_panda
 
     folder = find_menagerie_panda()
     if folder is not None:
@@ -187,7 +187,7 @@ def _visuals() -> Finding:
 
 
 def _cache() -> Finding:
-    from asset_pipeline.cache_root import CACHE_VARIABLE, cache_root
+    from manipose_mj.storage.cache_root import CACHE_VARIABLE, cache_root
 
     folder = cache_root()
     try:

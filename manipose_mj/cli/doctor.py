@@ -12,8 +12,8 @@ def doctor() -> int:
     from rich.table import Table
     from rich.text import Text
 
-    from manipose_mj.cli import output
     from manipose_mj.cli.diagnosis import examine
+    from manipose_mj.console import output
 
     with output.working_on("trying renderers and engines"):
         findings = examine()

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.cli.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
 
 
@@ -22,10 +22,7 @@ def evaluate(
     jobs: int = CORES,
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
-    assets: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
-    object_name: Annotated[
-        str | None, arg(name="object", metavar="NAME", help_behavior_hint="")
-    ] = None,
+    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
@@ -38,14 +35,14 @@ def evaluate(
       jobs: Episodes at the same time, one core each; results do not depend on it.
       out: Folder for the results; by default a new one under manipose_results.
       resume: Go on with the results in --out after an interruption.
-      assets: Folder of built assets to take objects from instead of the built-in ones.
-      object_name: The one object to manipulate, by its asset's name.
+      objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
+        folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
     from manipose_mj.evaluation.config import EvaluationConfig
-    from manipose_mj.protocol.frozen import EPISODES
+    from manipose_mj.evaluation.protocol.frozen import EPISODES
 
     if out is None:
         if resume:
@@ -53,12 +50,12 @@ def evaluate(
         out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
     if episodes is None:
         episodes = EPISODES if protocol else 50
-    config = EvaluationConfig(tasks, out, episodes, seed, pose, jobs, assets, object_name, protocol)
-    check_names(tasks, assets, object_name)
-    if assets is None:
-        # Once and here: workers would each build the same.
-        names = [object_name] if object_name else names_in_tasks(tasks, config.split)
-        load_objects(names, jobs)
+    config = EvaluationConfig(
+        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol
+    )
+    named = check_names(tasks, objects)
+    # Once and here: workers would each build the same.
+    load_objects(named if objects else names_in_tasks(tasks, config.split), jobs)
     return run_and_report(config, resume=resume)
 
 
@@ -69,8 +66,8 @@ def run_and_report(config, *, resume: bool) -> int:
       config: An `EvaluationConfig`.
       resume: Keep the results that its folder holds.
     """
-    from manipose_mj.cli import output
-    from manipose_mj.evaluation.report import write_report
+    from manipose_mj.console import output
+    from manipose_mj.evaluation.report.html import write_report
     from manipose_mj.evaluation.runner import evaluate as run
     from manipose_mj.evaluation.statistics import summarize
 
@@ -88,21 +85,27 @@ def run_and_report(config, *, resume: bool) -> int:
     return 0
 
 
-def check_names(tasks: tuple[str, ...], assets: Path | None, object_name: str | None) -> None:
-    """Find misspelt names before anything is written."""
-    from asset_pipeline.asset_json import list_assets
-    from manipose_mj.cli.builtin_objects import all_names
+def check_names(tasks: tuple[str, ...], objects: tuple[str, ...]) -> list[str]:
+    """Find misspelt names before anything is written.
+
+    Returns:
+      Those of the objects that are built in.
+
+    Raises:
+      InputError: There is no task, built-in object or asset folder of a name.
+    """
+    from manipose_mj.assets import categories
     from manipose_mj.suite import ALL_TASKS
+    from manipose_mj.tasks.core.object_selection import asset_folders, is_folder
 
     known = ["/".join(task) for task in ALL_TASKS]
     for task in tasks:
         if task not in known:
             raise unknown_name("task", task, known)
-    if assets is None:
-        names, place = all_names(), "built-in object"
-    else:
-        names, place = [folder.name for folder in list_assets(assets)], f"object in {assets}"
-        if object_name is None:
-            raise InputError(f"--assets {assets} needs --object: one of {', '.join(names)}")
-    if object_name is not None and object_name not in names:
-        raise unknown_name(place, object_name, names)
+    built_in = [each for each in objects if not is_folder(each)]
+    for name in built_in:
+        categories.find(name)
+    for each in objects:
+        if each not in built_in:
+            asset_folders(Path(each))
+    return built_in

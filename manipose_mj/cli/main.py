@@ -10,8 +10,10 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import assets, demo, doctor, evaluate, pose, render, tasks, view
-from manipose_mj.cli.process import hush_glfw
+from manipose_mj.cli import demo, doctor, evaluate, render, tasks, view
+from manipose_mj.cli.assets.app import build_app as build_assets_app
+from manipose_mj.cli.pose.app import build_app as build_pose_app
+from manipose_mj.console.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
 DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
@@ -26,8 +28,8 @@ def build_app() -> SubcommandApp:
     app.command(name="list")(tasks.list_tasks)
     app.command(render.render)
     app.command(view.view)
-    app.command(assets.build_app(), name="assets", help="Build, check and inspect object assets.")
-    app.command(pose.build_app(), name="pose", help="Train and evaluate pose estimators.")
+    app.command(build_assets_app(), name="assets", help="Build, check and inspect object assets.")
+    app.command(build_pose_app(), name="pose", help="Train and evaluate pose estimators.")
     app.command(doctor.doctor)
     return app
 
@@ -62,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    from manipose_mj.cli import output  # loads rich, which `--help` need not wait for
+    from manipose_mj.console import output
 
     output.fail_line(message)
     return code

@@ -19,8 +19,7 @@ def render(
     camera: str = "overview",
     height: int = 480,
     width: int = 640,
-    assets: Annotated[Path | None, arg(metavar="DIR")] = None,
-    object_name: Annotated[str | None, arg(name="object", metavar="NAME")] = None,
+    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...")] = (),
 ) -> None:
     """Save a picture of a task at the start of an episode.
 
@@ -31,24 +30,26 @@ def render(
       camera: Name of a camera of the scene.
       height: Height in pixels.
       width: Width in pixels.
-      assets: Folder of built assets to take objects from instead of the built-in ones.
-      object_name: The one object to show, by its asset's name.
+      objects: What to use instead of the task's own objects: names of built-in ones, asset folders, or
+        folders of asset folders.
     """
     from manipose_mj.cli.evaluate import check_names
 
     if height < 1 or width < 1:
         raise InputError(f"a picture of {width} x {height} pixels has nothing to show")
-    check_names((task,), assets, object_name)
+    check_names((task,), objects)
     from PIL import Image
 
     if out.suffix.lower() not in Image.registered_extensions():
         raise InputError(f"{out}: no picture format has this ending; try .png")
-    from manipose_mj.cli import output
-    from manipose_mj.control.episode import start_state
-    from manipose_mj.mjcf.pictures import render as draw
+    from manipose_mj.console import output
+    from manipose_mj.evaluation.episode import start_state
+    from manipose_mj.mjcf.cameras.pictures import render as draw
+    from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
     with output.working_on("drawing"):
-        model, data = start_state(task, seed=seed, assets=assets, object_name=object_name)
+        config = EnvConfig(task, obs_mode="state", objects=objects or None)
+        model, data = start_state(config, EpisodeSpec(seed))
         picture = draw(model, data, camera, height, width, engine="auto")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -9,8 +9,8 @@ def list_tasks(*, json: bool = False) -> None:
     Args:
       json: Print JSON, for other programs.
     """
-    from asset_pipeline import catalogue
-    from manipose_mj.cli import output
+    from manipose_mj.assets import catalogue
+    from manipose_mj.console import output
     from manipose_mj.suite import ALL_TASKS, describe
 
     tasks = [{"task": f"{d}/{t}", "description": describe(d, t)} for d, t in ALL_TASKS]

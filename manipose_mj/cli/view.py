@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg
@@ -14,30 +13,29 @@ def view(
     /,
     *,
     seed: int = 0,
-    assets: Annotated[Path | None, arg(metavar="DIR")] = None,
-    object_name: Annotated[str | None, arg(name="object", metavar="NAME")] = None,
+    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...")] = (),
 ) -> None:
     """Show a task in a window, in real time; the arm holds still, and the mouse can push things.
 
     Args:
       task: The task, as `manipose list` names it.
       seed: Seed of the first episode; when one is over, the next begins.
-      assets: Folder of built assets to take objects from instead of the built-in ones.
-      object_name: The one object to show, by its asset's name.
+      objects: What to use instead of the task's own objects: names of built-in ones, asset folders, or
+        folders of asset folders.
     """
     from manipose_mj.cli.evaluate import check_names
-    from manipose_mj.mjcf.viewer import open_viewer, require_display
+    from manipose_mj.mjcf.views.viewer import open_viewer, require_display
 
-    check_names((task,), assets, object_name)
+    check_names((task,), objects)
     require_display()
     import numpy as np
 
-    from manipose_mj.control.episode import load_environment
-    from manipose_mj.mjcf.panda import HOME, MAX_OPENING
+    from manipose_mj import suite
+    from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+    from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
-    environment = load_environment(task, assets=assets, object_name=object_name)
-    environment.random_state.seed(seed)
-    environment.reset()
+    environment = suite.make(EnvConfig(task, obs_mode="state", objects=objects or None))
+    environment.reset(EpisodeSpec(seed))
     action = np.append(HOME, MAX_OPENING)
     physics = environment.physics
     with open_viewer(physics.model.ptr, physics.data.ptr) as window:

@@ -1,25 +1,27 @@
-"""The baseline policy: perceive, plan symbolically, execute primitives."""
+"""The baseline policy: observe, plan symbolically, execute primitives."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 from dm_control import composer
 
-from manipose_mj.control.arm_model import ArmModel
-from manipose_mj.control.belief import Senses
-from manipose_mj.control.clearing import in_clutter, is_supported
-from manipose_mj.control.executor import Action, Executor
-from manipose_mj.control.failure import StageFailure
-from manipose_mj.control.motion_planner import MotionPlanner
-from manipose_mj.control.plan import Plan, Step, plan_to_json
-from manipose_mj.control.planner import make_plan
-from manipose_mj.control.pose_sources import make_senses
-from manipose_mj.control.primitives import Primitives
-from manipose_mj.control.recovery import let_go_safely
+from manipose_mj.control.execution.executor import Action, Executor
+from manipose_mj.control.execution.primitives import Primitives
+from manipose_mj.control.execution.recovery import let_go_safely
+from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.perception.pose_sources import make_perception
+from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
+from manipose_mj.control.planning.planner import candidate_plans
+from manipose_mj.control.planning.rearrangement import in_clutter, is_supported
+from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.failures import StageFailure
+from manipose_mj.tasks.core.task import ManipulationTask
 
 # Plans an episode may try, and stages whose failure another plan may mend.
 MAX_PLANS = 5
@@ -64,13 +66,13 @@ class Baseline:
         self._task = task
         self._physics = environment.physics
         self._arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        self._senses = make_senses(pose, task, self._physics)
+        self._perception = make_perception(pose, task, self._physics)
         self.status = ""
 
     @property
-    def senses(self) -> Senses:
+    def perception(self) -> Perception:
         """Where the baseline's knowledge comes from."""
-        return self._senses
+        return self._perception
 
     def actions(self, seed: int) -> Iterator[Action]:
         """The actions of one episode, from the start state to the goal.
@@ -82,22 +84,27 @@ class Baseline:
           StageFailure: The baseline gives up; the stage says where.
         """
         self.status = ""
+        self._perception.reset(seed)
         timestep = self._task.control_timestep
-        scene = self._senses.begin(seed)
-        planner = MotionPlanner(scene, self._arm, timestep, np.random.default_rng(seed))
-        executor = Executor(self._senses, timestep)
-        primitives = Primitives(executor, planner)
-        progress = _Progress()
-        failures = 0
+        executor = Executor(self._perception, timestep)
+        primitives = Primitives(executor)
+        rng = np.random.default_rng(seed)
+        progress, failures, allowance = _Progress(), 0, 0.0
         while True:
-            belief = executor.perceive()
-            step_by_step = in_clutter(self._task.goals, belief)
+            estimate = executor.observe()
+            planner = MotionPlanner(estimate.scene, self._arm, timestep, rng, allowance)
+            step_by_step = in_clutter(self._task.goals, estimate)
             try:
-                plan = make_plan(self._task.goals, belief, planner, progress.failures_here)
+                candidates = candidate_plans(self._task.goals, estimate, planner)
+                candidate = _after(candidates, progress.failures_here)
+                plan = candidate.steps()
             except InputError as error:
                 raise StageFailure("plan", str(error)) from None
+            # It stands until another plan is chosen.
+            allowance = candidate.contact_allowance
+            planner = planner.allowing(allowance)
             try:
-                yield from self._carry_out(plan, primitives, progress)
+                yield from self._carry_out(plan, planner, primitives, progress)
                 if not (step_by_step and plan):
                     break
             except StageFailure as failure:
@@ -110,31 +117,36 @@ class Baseline:
                     raise
                 self.status = "recover"
                 try:
-                    belief = executor.perceive()
-                    held = belief.objects.get(primitives.held or "")
-                    lies = step_by_step and held is not None and is_supported(held, planner)
-                    yield from let_go_safely(primitives, belief, failure, supported=lies)
+                    estimate = executor.observe()
+                    held = estimate.objects.get(primitives.held or "")
+                    lies = step_by_step and held is not None and is_supported(held, estimate.scene)
+                    yield from let_go_safely(primitives, planner, estimate, failure, supported=lies)
                 except StageFailure:
                     raise failure from None
         self.status = "done"
         yield from executor.wait(0.5)
 
     def _carry_out(
-        self, plan: Plan, primitives: Primitives, progress: _Progress
+        self, plan: Plan, planner: MotionPlanner, primitives: Primitives, progress: _Progress
     ) -> Iterator[Action]:
         for index, step in enumerate(plan):
             self.status = str(step)
             if step.primitive == "grasp_at":
-                yield from primitives.grasp_at(step.subject, _destination(plan, index))
+                yield from primitives.grasp_at(planner, step.subject, _destination(plan, index))
             elif step.primitive == "move_to":
-                yield from primitives.move_to(step)
+                yield from primitives.move_to(planner, step)
             else:
-                yield from primitives.release(step.subject)
+                yield from primitives.release(planner, step.subject)
                 progress.made()
 
 
+def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:
+    """The candidate after those that failed; where there are no more, the last of them."""
+    return deque(islice(candidates, failed + 1), maxlen=1).pop()
+
+
 def _destination(plan: Plan, index: int) -> Step | None:
-    """Where the thing grasped at `index` goes next."""
+    """Where the object grasped at `index` goes next."""
     following = plan[index + 1] if index + 1 < len(plan) else None
     if following is not None and following.primitive == "move_to":
         return following

@@ -1,0 +1,1 @@
+"""Policies through episodes to results, statistics and reports."""

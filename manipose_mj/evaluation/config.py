@@ -6,12 +6,16 @@ import hashlib
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from manipose_mj import protocol
+from manipose_mj.assets.categories import Split
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
+
+if TYPE_CHECKING:
+    from manipose_mj.tasks.core.config import EnvConfig
 
 
 @dataclass(frozen=True)
@@ -25,8 +29,8 @@ class EvaluationConfig:
       seed: Base seed, from which every episode's own seed follows.
       pose: Where the baseline takes object poses from.
       jobs: Episodes that run at the same time, each on one core. Results do not depend on it.
-      assets: Folder of built assets; None takes the built-in objects.
-      object_name: The one object to manipulate; None lets the task choose.
+      objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
+        folders of them.
       protocol: Version of the protocol whose seeds and test objects to take instead of `seed` and the
         training objects.
     """
@@ -37,8 +41,7 @@ class EvaluationConfig:
     seed: int = 0
     pose: str = "oracle"
     jobs: int = 1
-    assets: Path | None = None
-    object_name: str | None = None
+    objects: tuple[str, ...] | None = None
     protocol: str | None = None
 
     def __post_init__(self) -> None:
@@ -53,9 +56,9 @@ class EvaluationConfig:
             self._check_protocol(protocol.load(self.protocol))
 
     def _check_protocol(self, frozen: protocol.Protocol) -> None:
-        if self.seed or self.assets is not None or self.object_name is not None:
+        if self.seed or self.objects is not None:
             raise InputError(
-                f"protocol {self.protocol} fixes seeds and objects; leave out seed, assets and object"
+                f"protocol {self.protocol} fixes seeds and objects; leave out seed and objects"
             )
         for task in self.tasks:
             frozen.seed(task, self.episodes - 1)
@@ -67,9 +70,23 @@ class EvaluationConfig:
         return {"objects": objects, "furniture": "true"}
 
     @property
-    def split(self) -> str:
+    def split(self) -> Split:
         """Which built-in objects the episodes use."""
         return "train" if self.protocol is None else "test"
+
+    def env_config(self, task: str) -> EnvConfig:
+        """The environment that the episodes of a task take place in."""
+        # Loads the simulator: workers only.
+        from manipose_mj.control.perception.pose_sources import sensors_for
+        from manipose_mj.tasks.core.config import EnvConfig
+
+        return EnvConfig(
+            task,
+            obs_mode="state",
+            objects=self.objects,
+            split=self.split,
+            sensors=sensors_for(self.pose),
+        )
 
     def episode_seed(self, task: str, episode: int) -> int:
         """The seed of one episode."""
@@ -85,8 +102,7 @@ class EvaluationConfig:
             "episodes": self.episodes,
             "seed": self.seed,
             "pose": self.pose,
-            "assets": None if self.assets is None else str(self.assets.resolve()),
-            "object": self.object_name,
+            "objects": None if self.objects is None else list(self.objects),
             "protocol": self.protocol,
             "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,
         }
@@ -98,10 +114,8 @@ class EvaluationConfig:
         chosen = ["--protocol", self.protocol] if self.protocol else ["--seed", str(self.seed)]
         words += ["--episodes", str(self.episodes), *chosen, "--pose", self.pose]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
-        if self.assets is not None:
-            words += ["--assets", str(self.assets)]
-        if self.object_name is not None:
-            words += ["--object", self.object_name]
+        if self.objects is not None:
+            words += ["--objects", *self.objects]
         return shlex.join(words)
 
 

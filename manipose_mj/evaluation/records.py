@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.failure import STAGES
 from manipose_mj.errors import InputError
+from manipose_mj.failures import STAGES
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.errors import InputError, WorkerDiedError
 from manipose_mj.evaluation.config import EvaluationConfig
@@ -26,6 +26,9 @@ from manipose_mj.evaluation.records import (
 )
 from manipose_mj.evaluation.statistics import machine, summarize, versions
 
+if TYPE_CHECKING:
+    from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+
 RESULTS_FILE = "results.jsonl"
 SUMMARY_FILE = "summary.json"
 RUN_FILE = "run.json"
@@ -37,28 +40,22 @@ class Runner(Protocol):
     """What runs one episode; must survive pickling by `cloudpickle`."""
 
     def __call__(
-        self,
-        task: str,
-        *,
-        episode: int,
-        seed: int,
-        pose: str,
-        assets: Path | None,
-        object_name: str | None,
-        split: str,
+        self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
     ) -> tuple[EpisodeResult, Trajectory]: ...
 
 
-def simulate(task: str, **options: Any) -> tuple[EpisodeResult, Trajectory]:
+def simulate(
+    config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
+) -> tuple[EpisodeResult, Trajectory]:
     """The runner of every real evaluation: the baseline policy in MuJoCo."""
-    from manipose_mj.control.episode import run_episode  # loads the simulator: workers only
+    from manipose_mj.evaluation.episode import run_episode  # loads the simulator: workers only
 
     # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
     simulator_log = logging.getLogger("absl")
     level = simulator_log.level
     simulator_log.setLevel(logging.ERROR)
     try:
-        return run_episode(task, **options)
+        return run_episode(config, spec, episode=episode, pose=pose)
     finally:
         simulator_log.setLevel(level)
 
@@ -224,14 +221,10 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     path = trajectory_path(config.out, task, episode)
     start = time.perf_counter()
     try:
+        from manipose_mj.tasks.core.config import EpisodeSpec  # loads the simulator: workers only
+
         result, trajectory = runner(
-            task,
-            episode=episode,
-            seed=seed,
-            pose=config.pose,
-            assets=config.assets,
-            object_name=config.object_name,
-            split=config.split,
+            config.env_config(task), EpisodeSpec(seed), episode=episode, pose=config.pose
         )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
     except (InputError, OSError, MemoryError):
@@ -252,7 +245,7 @@ def _crashed(
         task=task,
         episode=episode,
         seed=seed,
-        object=config.object_name or "",
+        object="",
         pose_source=config.pose,
         success_once=False,
         success_at_end=False,

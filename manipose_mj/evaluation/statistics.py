@@ -13,8 +13,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from manipose_mj.control.failure import STAGES
 from manipose_mj.evaluation.records import EpisodeResult
+from manipose_mj.failures import STAGES
 
 VERSIONED = ("mujoco", "dm_control", "mink", "numpy", "manipose_mj")
 

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
 from dm_env import TimeStep
 from gymnasium.error import ResetNeeded
 
-from asset_pipeline.assets import Asset
-from asset_pipeline.catalogue import Split
 from manipose_mj import suite
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
-from manipose_mj.tasks.goals import Goal, all_met
-from manipose_mj.tasks.observations import SensorConfig
-from manipose_mj.tasks.options import Reward
-from manipose_mj.tasks.registry import TaskSpec, task_spec
-from manipose_mj.tasks.scene_state import SceneState
+from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, EpisodeSpec
+from manipose_mj.tasks.core.registry import TaskSpec, named_task
+from manipose_mj.tasks.goals import Goal, success
+from manipose_mj.tasks.scene.state import SceneState
 
 Observation = dict[str, np.ndarray]
 _SEEDS = 2**32
+RESET_OPTIONS = ("object",)
 
 
 class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
@@ -45,67 +42,34 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         self,
         task: str | TaskSpec,
         *,
-        obs_mode: str = "state+pose",
-        control_mode: str = "pd_joint_pos",
-        reward_mode: Reward = "sparse",
         render_mode: str | None = None,
-        sensors: SensorConfig | None = None,
-        objects: Sequence[Asset] | None = None,
-        split: Split = "train",
-        randomisation: str = "none",
         camera: str = "overview",
         height: int = 480,
         width: int = 640,
+        **config: Unpack[EnvOptions],
     ) -> None:
         """Compiles the task.
 
         Args:
           task: `"domain/name"`.
-          obs_mode: Any `+` combination of observation modes.
-          control_mode: What actions mean.
-          reward_mode: `"sparse"` or `"dense"`.
           render_mode: `"rgb_array"`, `"human"` for a window, or None.
-          sensors: Cameras, image size and cloud size of observations.
-          objects: Assets to use instead of the built-in ones.
-          split: Which built-in objects, train or test.
-          randomisation: Strength of domain randomisation.
           camera: That `render` looks through.
           height: Of a rendered picture [pixels].
           width: Of a rendered picture [pixels].
+          **config: Fields of `manipose_mj.tasks.EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`,
+            `objects`, `split`, `randomisation`, `sensors`.
 
         Raises:
           InputError: A mode, a name or an object cannot be used.
         """
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
-        spec = task if isinstance(task, TaskSpec) else task_spec(*task.split("/", 1))
-        self._arguments: dict[str, Any] = {
-            "task": spec,
-            "obs_mode": obs_mode,
-            "control_mode": control_mode,
-            "reward_mode": reward_mode,
-            "render_mode": render_mode,
-            "sensors": sensors,
-            "objects": objects,
-            "split": split,
-            "randomisation": randomisation,
-            "camera": camera,
-            "height": height,
-            "width": width,
-        }
+        spec = task if isinstance(task, TaskSpec) else named_task(task)
+        # The specification, not its name: a process that loads a pickled environment registers the task.
+        rendering = {"render_mode": render_mode, "camera": camera, "height": height, "width": width}
+        self._arguments: dict[str, Any] = {"task": spec, **rendering, **config}
         self.render_mode = render_mode
-        self.environment = suite.load_spec(
-            spec,
-            None,
-            observations=obs_mode,
-            sensors=sensors or SensorConfig(),
-            control_mode=control_mode,
-            reward=reward_mode,
-            objects=None if objects is None else tuple(objects),
-            split=split,
-            randomisation=randomisation,
-            environment_kwargs={},
-        )
+        self.environment = suite.make(EnvConfig(spec.full_name, **config))
         self.observation_space = observation_space(self.environment.observation_spec())
         self.action_space = action_box(self.environment.action_spec())
         self._view = View(render_mode, camera, height, width)
@@ -119,19 +83,19 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         Args:
           seed: Determines this episode and those that follow without a seed, bit for bit; the same as
             `suite.load`'s.
-          options: None are known.
+          options: `"object"`, the name of the asset that the episode shall be about, one of the
+            environment's.
 
         Raises:
-          InputError: The seed is no 32-bit number, or an option is given.
+          InputError: The seed is no 32-bit number, an option is unknown, or no object has that name.
         """
-        if options:
-            raise InputError(f"unknown reset option {next(iter(options))!r}; there are none")
+        for name in options or {}:
+            if name not in RESET_OPTIONS:
+                raise unknown_name("reset option", name, RESET_OPTIONS)
         if seed is not None and not 0 <= seed < _SEEDS:
             raise InputError(f"seed is {seed}; expected 0 to {_SEEDS - 1}")
         super().reset(seed=seed)
-        if seed is not None:
-            self.environment.random_state.seed(seed)
-        step = self.environment.reset()
+        step = self.environment.reset(EpisodeSpec(seed, **(options or {})))
         self._running = True
         self._show()
         return _copied(step), self._info()
@@ -185,7 +149,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           goals: Instead of this episode's: for relabelling with goals that were reached.
         """
         tolerance = self.environment.task.config.tolerance
-        return bool(all_met(goals or self.goals, state, tolerance))
+        return bool(success(goals or self.goals, state, tolerance))
 
     def reward_of(self, state: SceneState, goals: tuple[Goal, ...] | None = None) -> float:
         """The reward, of this environment's mode, that a state gives; arguments as for `is_success`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from manipose_mj.tasks.registry import TaskSpec, on_registration
+from manipose_mj.tasks.core.registry import TaskSpec, on_registration
 
 NAMESPACE = "manipose_mj"
 

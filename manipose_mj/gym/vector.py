@@ -9,7 +9,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv
 
 from manipose_mj.errors import InputError
 from manipose_mj.gym.env import ManiPoseEnv
-from manipose_mj.tasks.registry import task_spec
+from manipose_mj.tasks.core.registry import named_task
 
 
 def make_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv:
@@ -28,7 +28,7 @@ def make_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv:
     if num_envs < 1:
         raise InputError(f"num_envs is {num_envs}; expected at least 1")
     if isinstance(task := arguments.pop("task"), str):
-        task = task_spec(*task.split("/", 1))
+        task = named_task(task)
     make = partial(ManiPoseEnv, task, **arguments)
     if num_envs == 1:
         return SyncVectorEnv([make])

@@ -9,8 +9,8 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import UInt8
 
-from manipose_mj.mjcf.pictures import painter
-from manipose_mj.mjcf.viewer import open_viewer, require_display
+from manipose_mj.mjcf.cameras.pictures import painter
+from manipose_mj.mjcf.views.viewer import open_viewer, require_display
 
 
 class View:

@@ -6,18 +6,25 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float
 
+from manipose_mj.assets.physics import (
+    COLLISION_GROUP,
+    CONE,
+    IMPRATIO,
+    INTEGRATOR,
+    NOSLIP_ITERATIONS,
+    SCENE_CONTACT_TIME,
+    SOLIMP,
+    SUPPORT_CONDIM,
+    SUPPORT_FRICTION,
+    TIMESTEP,
+)
+
 TABLE_HALF_EXTENTS = (0.72, 0.8, 0.02)
 TABLE_CENTER = (0.52, 0.0, -0.02)
 TABLE_HEIGHT = 0.75
-PHYSICS_TIMESTEP = 0.002
-# Of contacts between things, furniture and table [s], half of what the assets' models state: what the
-# arm flings at 2 m/s then dents the table by 4 mm, not 7. The least that MuJoCo takes is two time steps.
-CONTACT_TIME = 0.005
 CARPET = 0.015
 
-# Seen by sensors: 0-2. Collision geometry: 3. Goal markers, which only pictures show: 4.
-COLLISION_GROUP = 3
-MARKER_GROUP = 4
+MARKER_GROUP = 4  # of goal markers, which only pictures show
 
 # Position and the point looked at, in the world frame [m]; vertical field of view [deg].
 FIXED_CAMERAS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
@@ -72,8 +79,8 @@ class TableArena(composer.Arena):
         table = self._mjcf_root.worldbody.add("body", name="table")
         table.add(
             "geom", name="table", type="box", size=TABLE_HALF_EXTENTS, pos=TABLE_CENTER,
-            rgba=[0.72, 0.58, 0.43, 1], friction=[0.8, 0.005, 0.0001], condim=4,
-            solref=[CONTACT_TIME, 1], solimp=[0.8, 0.999, 0.001, 0.5, 2],
+            rgba=[0.72, 0.58, 0.43, 1], friction=SUPPORT_FRICTION, condim=SUPPORT_CONDIM,
+            solref=[SCENE_CONTACT_TIME, 1], solimp=SOLIMP,
         )  # fmt: skip
         thickness = 2 * TABLE_HALF_EXTENTS[2]
         leg = (TABLE_HEIGHT - thickness) / 2
@@ -103,13 +110,12 @@ def look_at(
 
 
 def _set_physics_options(root: mjcf.RootElement) -> None:
-    # An elliptic cone with impratio 10 and the no-slip solver keeps a held object from creeping.
     root.option.set_attributes(
-        timestep=PHYSICS_TIMESTEP,
-        integrator="implicitfast",
-        cone="elliptic",
-        impratio=10,
-        noslip_iterations=10,
+        timestep=TIMESTEP,
+        integrator=INTEGRATOR,
+        cone=CONE,
+        impratio=IMPRATIO,
+        noslip_iterations=NOSLIP_ITERATIONS,
     )
     # What rests is not computed until something that moves touches it; parked objects never are.
     root.option.flag.sleep = "enable"

@@ -6,16 +6,16 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float, Int
 
-from asset_pipeline.assets import Asset
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.physics import SCENE_CONTACT_TIME
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.arena import CONTACT_TIME
 from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
 
 
 def _stiffen(root: mjcf.RootElement) -> None:
     for geom in root.find_all("geom"):
         if geom.solref is not None:
-            geom.solref = [CONTACT_TIME, 1.0]
+            geom.solref = [SCENE_CONTACT_TIME, 1.0]
 
 
 class RigidObject(composer.Entity):
@@ -34,6 +34,7 @@ class RigidObject(composer.Entity):
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:
+        """The asset's MJCF."""
         return self._mjcf_root
 
     @property
@@ -76,6 +77,7 @@ class ArticulatedObject(composer.Entity):
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:
+        """The asset's MJCF."""
         return self._mjcf_root
 
     def joint(self, part: str) -> mjcf.Element:

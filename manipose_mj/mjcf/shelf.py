@@ -8,8 +8,13 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float
 
+from manipose_mj.assets.physics import (
+    SCENE_CONTACT_TIME,
+    SOLIMP,
+    SUPPORT_CONDIM,
+    SUPPORT_FRICTION,
+)
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.arena import CONTACT_TIME
 from manipose_mj.poses import pose_to_vector, vector_to_pose
 
 # Enough for the hand, 20 cm across its fingers and 11 cm from palm to fingertips, to enter lying.
@@ -88,12 +93,13 @@ class Shelf(composer.Entity):
         # Contacts as the table's: things rest on boards as they rest there.
         self._body.add(
             "geom", name=name, type="box", size=(high_corner - low_corner) / 2,
-            pos=(high_corner + low_corner) / 2, rgba=rgba, friction=[0.8, 0.005, 0.0001], condim=4,
-            solref=[CONTACT_TIME, 1], solimp=[0.8, 0.999, 0.001, 0.5, 2],
+            pos=(high_corner + low_corner) / 2, rgba=rgba, friction=SUPPORT_FRICTION, condim=SUPPORT_CONDIM,
+            solref=[SCENE_CONTACT_TIME, 1], solimp=SOLIMP,
         )  # fmt: skip
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:
+        """The shelf's MJCF."""
         return self._mjcf_root
 
     @property

@@ -12,7 +12,7 @@ _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
 @contextmanager
-def static_things_moving(physics: mjcf.Physics) -> Iterator[None]:
+def sleep_disabled(physics: mjcf.Physics) -> Iterator[None]:
     """Let `physics.forward()` follow what is written to the model: where furniture, markers, cameras are.
 
     While sleep is on, MuJoCo (3.17) places bodies without joints once, when its data are reset, and

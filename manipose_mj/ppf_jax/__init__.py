@@ -1,1 +1,29 @@
-"""Point-pair-feature voting in JAX: from a partial cloud to a 6D pose, extents and a confidence."""
+"""Pose estimation from partial clouds by point-pair features and voting, in JAX.
+
+`PoseEstimator` finds rigid objects, `ArticulatedEstimator` the handles and joints of furniture, and
+`TwoNetworkFusion` flat objects of round categories. Importing this package loads none of them, and no JAX,
+before the first one is used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from manipose_mj.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, PartEstimate
+    from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator
+    from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+    from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
+
+__all__ = [
+    "ArticulatedEstimator",
+    "LabelledCloud",
+    "PartEstimate",
+    "PoseEstimate",
+    "PoseEstimator",
+    "TwoNetworkFusion",
+]
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
 from manipose_mj.errors import InputError
-from manipose_mj.ppf_jax.articulated_clouds import CLOUD_POINTS
-from manipose_mj.ppf_jax.articulated_model import ArticulatedModel, estimate_furniture
-from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
-from manipose_mj.ppf_jax.cloud_normals import cloud_normals
-from manipose_mj.ppf_jax.weights import load_weights
+from manipose_mj.ppf_jax.articulated.model import ArticulatedModel, estimate_furniture
+from manipose_mj.ppf_jax.data.articulated.clouds import CLOUD_POINTS
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.weight_files import load_weights
 
 WEIGHTS = "furniture.npz"
 # Sizes that clouds are padded to; one compilation each.

@@ -13,22 +13,22 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from asset_pipeline.catalogue import CATALOGUE
-from asset_pipeline.labelling.label import OBJECT_TYPES
+from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, pose_error
-from manipose_mj.ppf_jax.cloud_input import AnyCloud, checked_cloud
-from manipose_mj.ppf_jax.cloud_normals import cloud_normals
-from manipose_mj.ppf_jax.clouds import MAX_POINTS, SAMPLE_POINTS
-from manipose_mj.ppf_jax.model import (
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
+from manipose_mj.ppf_jax.points.outlier_removal import not_alone
+from manipose_mj.ppf_jax.rigid.model import (
     Estimates,
     EstimatingModel,
     PoseModel,
     estimate_batch,
     estimate_sample,
 )
-from manipose_mj.ppf_jax.outliers import not_alone
-from manipose_mj.ppf_jax.weights import LabelSet, MethodName, TrainedModel, load_weights
+from manipose_mj.ppf_jax.weight_files import LabelSet, MethodName, TrainedModel, load_weights
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
@@ -132,9 +132,9 @@ class PoseEstimator:
             normals = cloud_normals(points) if normals is None else normals
             found = _estimate(model, *_padded(points, normals, size), key=key)
             return _as_estimate(found, axial)
-        # Only where one looks: normals take longer than all else outside the networks.
-        looked_at = np.asarray(_looks_at(model, np.arange(size) < len(points), key=key))
-        rows = looked_at[looked_at < len(points)]
+        # Only of the rows that are used: normals take longer than all else outside the networks.
+        sampled = np.asarray(_sample_rows(model, np.arange(size) < len(points), key=key))
+        rows = sampled[sampled < len(points)]
         first = rows[: model.config.points]
         normals = cloud_normals(points, first) if normals is None else normals[first]
         kept, mask = _filled(points[rows], model.config.sample)
@@ -188,8 +188,8 @@ _estimate_sample = jax.jit(estimate_sample)
 
 
 @jax.jit
-def _looks_at(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "m"]:
-    return model.looks_at(mask, key=key)
+def _sample_rows(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "m"]:
+    return model.sample_rows(mask, key=key)
 
 
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import scan_files as files
 import trimesh
 
-from asset_pipeline.assets import Area, Asset, GraspSet, MovingPart, Provenance, StablePose
-from asset_pipeline.emit import write_asset
-from asset_pipeline.geometry import Body, Joint, MassProperties, Shape
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.labelling.label_quality import LabelQuality
+import tests.asset_pipeline.scan_files as files
+from asset_pipeline.build.emit import write_asset
+from manipose_mj.assets.asset import Area, Asset, GraspSet, MovingPart, Provenance, StablePose
+from manipose_mj.assets.geometry import Body, Joint, MassProperties, Shape
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.poses import SymmetryGroup
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -7,18 +7,18 @@ from contextlib import contextmanager
 
 import gymnasium
 import numpy as np
-from dm_control import mjcf
 from dm_control import suite as dm_suite
 
-from asset_pipeline import catalogue
 from manipose_mj import register_task
+from manipose_mj.assets import catalogue
 from manipose_mj.gym import env_id
-from manipose_mj.mjcf.objects import RigidObject
 from manipose_mj.poses import compose
-from manipose_mj.tasks import registry
-from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.tasks.core import registry
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.preview import Preview
+from manipose_mj.tasks.core.start import EpisodeStart, PlacedObject
+from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import OnTableGoal, PoseGoal
-from manipose_mj.tasks.options import TaskConfig, TaskOptions
 
 FATAL_STEP = 3
 
@@ -26,34 +26,21 @@ FATAL_STEP = 3
 class Diverging(ManipulationTask):
     """Its simulation breaks in the first episode, at the third control step, and never again."""
 
-    def __init__(self, options: TaskOptions) -> None:
-        super().__init__(TaskConfig(horizon=0.4), options)
-        self.object = RigidObject(catalogue.load("box", 0), name="object")
-        self._arena.add_free_entity(self.object)
-        self._instances["object"] = self.object
+    def __init__(self, env_config: EnvConfig) -> None:
+        super().__init__(TaskConfig(horizon=0.4), env_config)
+        self.asset = catalogue.load("box", 0)
+        self.scene.add_objects([self.asset])
         self.episodes = self.steps = 0
-        self._finish_build()
 
-    @property
-    def goals(self) -> tuple:
-        return (
-            PoseGoal("object", compose(np.eye(3), np.array([0.5, 0.0, 0.1]))),
-            OnTableGoal("object"),
-        )
-
-    @property
-    def movable(self) -> dict[str, RigidObject]:
-        return {"object": self.object}
-
-    @property
-    def object_name(self) -> str:
-        return self.object.asset.name
-
-    def place_objects(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
+    def sample(self, rng, spec: EpisodeSpec, preview: Preview) -> EpisodeStart:
         self.episodes, self.steps = self.episodes + 1, 0
-        rest = self.object.asset.stable_poses[0]
-        x, y = random_state.uniform([0.4, -0.2], [0.6, 0.2])
-        self.object.place(physics, compose(rest.rotation, np.array([x, y, rest.height])))
+        rest = self.asset.stable_poses[0]
+        x, y = rng.uniform([0.4, -0.2], [0.6, 0.2])
+        pose = compose(rest.rotation, np.array([x, y, rest.height]))
+        goal = PoseGoal("object", compose(np.eye(3), np.array([0.5, 0.0, 0.1])))
+        return EpisodeStart(
+            goals=(goal, OnTableGoal("object")), objects={"object": PlacedObject(0, pose)}
+        )
 
     def before_step(self, physics, action, random_state) -> None:
         super().before_step(physics, action, random_state)
@@ -62,9 +49,9 @@ class Diverging(ManipulationTask):
             physics.data.qvel[:] = 1e11
 
 
-def diverging(options: TaskOptions) -> Diverging:
+def diverging(env_config: EnvConfig) -> Diverging:
     """Break the simulation."""
-    return Diverging(options)
+    return Diverging(env_config)
 
 
 @contextmanager

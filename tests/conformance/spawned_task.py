@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from own_tasks import Diverging
-
 from manipose_mj import register_task
-from manipose_mj.tasks.options import TaskOptions
+from manipose_mj.tasks import EnvConfig
+from tests.conformance.own_tasks import Diverging
 
 
 @register_task("example", "spawned")
-def spawned(options: TaskOptions) -> Diverging:
+def spawned(env_config: EnvConfig) -> Diverging:
     """Break the simulation, in whatever process."""
-    return Diverging(options)
+    return Diverging(env_config)

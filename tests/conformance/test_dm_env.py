@@ -10,12 +10,12 @@ import pytest
 from absl.testing import absltest
 from dm_control.rl.control import PhysicsError
 from dm_env.test_utils import EnvironmentTestMixin
-from own_tasks import FATAL_STEP, diverging, registered
 
 from manipose_mj import suite
-from manipose_mj.control.modes import CONTROL_MODES
+from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.observations import MODES, SensorConfig
+from manipose_mj.tasks.observations.sensors import MODES, SensorConfig
+from tests.conformance.own_tasks import FATAL_STEP, diverging, registered
 
 TASK = ("single_object", "target_pose")
 SENSORS = SensorConfig(cameras=("front",), height=24, width=32, cloud_size=256)
@@ -49,30 +49,33 @@ class Conformance(EnvironmentTestMixin, absltest.TestCase):
         self.environment.close()  # twice
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_tasks_conform(task):
     Conformance(suite.load(*task, seed=0, environment_kwargs=SHORT)).check()
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
 def test_control_modes_conform(mode):
     environment = suite.load(
-        *TASK, seed=0, observations="state", control_mode=mode, environment_kwargs=SHORT
+        *TASK, seed=0, obs_mode="state", control_mode=mode, environment_kwargs=SHORT
     )
     assert environment.action_spec().name == mode
     Conformance(environment).check()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", MODES)
 def test_observation_modes_conform(mode):
     environment = suite.load(
-        *TASK, seed=0, observations=mode, sensors=SENSORS, environment_kwargs=SHORT
+        *TASK, seed=0, obs_mode=mode, sensors=SENSORS, environment_kwargs=SHORT
     )
     Conformance(environment).check()
 
 
 def test_a_pickled_environment_goes_on_with_the_same_episodes():
-    first = suite.load(*TASK, seed=5, control_mode="pd_ee_delta_pose", observations="state+pose")
+    first = suite.load(*TASK, seed=5, control_mode="pd_ee_delta_pose", obs_mode="state+pose")
     first.reset()
     second = pickle.loads(pickle.dumps(first))
     spec = first.action_spec()
@@ -96,7 +99,7 @@ def test_a_pickled_environment_goes_on_with_the_same_episodes():
         ),
         ({"control_mode": "primitives"}, "did you mean primitive"),
         ({"control_mode": ""}, "control mode ''; known: .*pd_joint_pos"),
-        ({"reward": "spars"}, "did you mean sparse"),
+        ({"reward_mode": "spars"}, "did you mean sparse"),
         ({"split": "tests"}, "did you mean test"),
     ],
 )
@@ -132,21 +135,25 @@ def test_a_diverging_simulation_ends_its_episode_and_leaves_nothing_to_the_next(
         assert np.array_equal(broken.physics.data.qpos, sound.physics.data.qpos)
 
 
-def test_a_start_that_diverges_is_drawn_anew(monkeypatch, caplog):
+def test_a_start_that_diverges_is_followed_by_another(monkeypatch, caplog):
     environment, sound = (suite.load(*TASK, seed=3) for _ in range(2))
     task, fatal, states = environment.task, [True, True, False], []
-    place = task.place_objects
+    draw, write = task.draw, task.scene.write
 
-    def place_or_fling(physics, random_state):
+    def watched(random_state, spec):
         states.append(random_state.get_state())
-        place(physics, random_state)
+        return draw(random_state, spec)
+
+    def write_and_fling(physics, start):
+        write(physics, start)
         if fatal.pop(0):
             physics.data.qvel[-6:] = 1e12
 
-    monkeypatch.setattr(task, "place_objects", place_or_fling)
+    monkeypatch.setattr(task, "draw", watched)
+    monkeypatch.setattr(task.scene, "write", write_and_fling)
     step = environment.reset()
     assert step.first() and environment.failure == "" and fatal == []
-    assert caplog.text.count("drawing the start anew") == 2
+    assert caplog.text.count("drawing another start") == 2
     sound.random_state.set_state(states[-1])
     expected = sound.reset()
     assert all(np.array_equal(v, step.observation[k]) for k, v in expected.observation.items())

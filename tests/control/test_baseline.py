@@ -7,20 +7,22 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from asset_pipeline import catalogue
 from manipose_mj import suite
-from manipose_mj.control import episode
+from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.executor import Executor
-from manipose_mj.control.failure import StageFailure
-from manipose_mj.control.motion_planner import MotionPlanner
-from manipose_mj.control.primitives import Primitives
+from manipose_mj.control.execution.executor import Executor
+from manipose_mj.control.execution.primitives import Primitives, retraction_of
+from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation import episode
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
-from manipose_mj.mjcf.panda import HOME, MAX_OPENING
+from manipose_mj.failures import StageFailure
+from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import compose, invert, rotation_angle
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.goals import PoseGoal
-from manipose_mj.tasks.target_pose import TargetPose
+from manipose_mj.tasks.single_object.target_pose import TargetPose
+from tests.tasks.contact import touches_robot
 
 TARGET_POSE = "single_object/target_pose"
 STORE = "articulated/store_chips_can_middle_drawer"
@@ -29,7 +31,7 @@ HOLD = np.append(HOME, MAX_OPENING)
 
 
 def _run(task: str, seed: int) -> tuple[EpisodeResult, Trajectory]:
-    return episode.run_episode(task, episode=0, seed=seed)
+    return episode.run_episode(EnvConfig(task, obs_mode="state"), EpisodeSpec(seed))
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +39,7 @@ def episodes() -> dict[tuple[str, int], tuple[EpisodeResult, Trajectory]]:
     return {(task, seed): _run(task, seed) for task, seeds in SEEDS.items() for seed in seeds}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("task", SEEDS)
 def test_the_baseline_succeeds(episodes, task):
     for seed in SEEDS[task]:
@@ -54,6 +57,7 @@ def test_nothing_is_pushed_into_anything(episodes, task):
     assert max(episodes[task, seed][0].max_penetration for seed in SEEDS[task]) < 0.002
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("task", SEEDS)
 def test_an_episode_repeats_bit_for_bit_whatever_ran_before(episodes, task):
     seed = SEEDS[task][0]
@@ -74,9 +78,10 @@ def test_the_record_follows_the_episode(episodes):
     assert result.sim_time == pytest.approx(result.steps * 0.02)
     assert times[0] == 0 and times[-1] == pytest.approx(result.sim_time, abs=1e-6)
     assert (np.diff(times) >= 0).all() and len(positions) == len(times)
-    model = episode.scene_model(TARGET_POSE, seed=0)
+    start = EnvConfig(TARGET_POSE, obs_mode="state"), EpisodeSpec(0)
+    model = episode.scene_model(*start)
     assert positions.shape[1] == model.nq
-    _, data = episode.start_state(TARGET_POSE, seed=0)
+    _, data = episode.start_state(*start)
     np.testing.assert_allclose(positions[0], data.qpos, atol=1e-6)
 
 
@@ -86,16 +91,17 @@ def test_a_held_object_does_not_slip(name):
         "single_object",
         "target_pose",
         seed=0,
-        observations="state",
+        obs_mode="state",
         objects=[catalogue.load_by_name(name)],
         environment_kwargs={"time_limit": 60.0},
     )
     environment.reset()
     baseline, task, physics = Baseline(environment), environment.task, environment.physics
-    executor = Executor(baseline.senses, task.control_timestep)
+    executor = Executor(baseline.perception, task.control_timestep)
     rng = np.random.default_rng(0)
-    planner = MotionPlanner(baseline.senses.begin(0), baseline._arm, task.control_timestep, rng)
-    primitives = Primitives(executor, planner)
+    scene = executor.observe().scene
+    planner = MotionPlanner(scene, baseline._arm, task.control_timestep, rng)
+    primitives = Primitives(executor)
 
     def play(actions) -> None:
         for action in actions:
@@ -104,13 +110,14 @@ def test_a_held_object_does_not_slip(name):
     def in_hand() -> np.ndarray:
         return invert(task.robot.tcp_pose(physics)) @ task.object.object_pose(physics)
 
-    play(primitives.grasp_at("object", None))
+    play(primitives.grasp_at(planner, "object", None))
     before = task.object.object_pose(physics)[2, 3]
-    play(executor.follow(primitives._lift("object")))
+    estimate = executor.observe()
+    play(executor.follow(retraction_of(planner.within(estimate.scene), estimate, "object")))
     play(executor.wait(0.5))
     start = in_hand()
     assert task.object.object_pose(physics)[2, 3] > before + 0.025
-    assert task.touches_robot(physics, task.object)
+    assert touches_robot(task, physics, task.object)
     play(executor.wait(5.0))
     slipped = in_hand()
     assert np.linalg.norm(slipped[:3, 3] - start[:3, 3]) < 1e-3
@@ -127,6 +134,7 @@ def _fail(monkeypatch, actions, task: str = TARGET_POSE) -> EpisodeResult:
     return result
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("away", [(2.0, 0.0, 0.1), (0.5, 0.0, -0.3)], ids=["far", "in the table"])
 def test_a_goal_out_of_reach_fails_in_planning(monkeypatch, away):
     goal = PoseGoal("object", compose(np.eye(3), np.array(away)))
@@ -152,7 +160,7 @@ def test_stopping_short_of_the_goal_is_a_failure(monkeypatch):
 
 
 def test_running_out_of_time_is_recorded(monkeypatch):
-    environment, _ = episode._environment(TARGET_POSE, None, None, "train", "oracle")
+    environment, _ = episode._environment(EnvConfig(TARGET_POSE, obs_mode="state"), "oracle")
     monkeypatch.setattr(environment, "_time_limit", 0.1)
     result = _fail(monkeypatch, lambda self, seed: iter([HOLD] * 100))
     assert (result.failure, result.steps) == ("timeout", 5)
@@ -183,12 +191,15 @@ def test_an_unknown_stage_cannot_be_raised():
         ({"task": "single_object/target_pse"}, "did you mean single_object/target_pose"),
         ({"task": "target_pose"}, "unknown task"),
         ({"pose": "orcale"}, "oracle"),
-        ({"object_name": "chips_cam_000"}, "chips_can_000"),
-        ({"assets": "nowhere"}, "no such folder"),
+        ({"objects": "chips_cam_000"}, "chips_can_000"),
+        ({"objects": "./nowhere"}, "no such folder"),
+        (
+            {"spec": EpisodeSpec(0, object="box_010")},
+            "unknown object 'box_010'; did you mean box_0",
+        ),
     ],
 )
-def test_names_that_do_not_exist_are_refused(arguments, message, tmp_path):
-    if "assets" in arguments:
-        arguments = {"assets": tmp_path / arguments["assets"], "object_name": "x"}
+def test_names_that_do_not_exist_are_refused(arguments, message):
+    spec, pose = arguments.pop("spec", EpisodeSpec(0)), arguments.pop("pose", "oracle")
     with pytest.raises(InputError, match=message):
-        episode.run_episode(**{"task": TARGET_POSE, "episode": 0, "seed": 0, **arguments})
+        episode.run_episode(EnvConfig(**{"task": TARGET_POSE, **arguments}), spec, pose=pose)

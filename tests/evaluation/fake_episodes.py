@@ -9,9 +9,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from manipose_mj.control.failure import STAGES
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
+from manipose_mj.failures import STAGES
 
 TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer")
 
@@ -19,7 +19,8 @@ TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer
 def make_runner(seconds: float = 0.0, diary: Path | None = None):
     """A runner whose outcome follows from the seed alone; local, so that it pickles by value."""
 
-    def run(task, *, episode, seed, pose, assets, object_name, split):
+    def run(config, spec, *, episode, pose):
+        task, seed = config.task, spec.seed
         start = time.perf_counter()
         rng = np.random.default_rng(seed)
         time.sleep(seconds * rng.uniform(0.5, 1.5))
@@ -29,7 +30,7 @@ def make_runner(seconds: float = 0.0, diary: Path | None = None):
             task=task,
             episode=episode,
             seed=seed,
-            object=object_name or "mug",
+            object=config.objects[0] if config.objects else "mug",
             pose_source=pose,
             success_once=success or bool(rng.random() < 0.3),
             success_at_end=success,
@@ -53,7 +54,7 @@ def make_runner(seconds: float = 0.0, diary: Path | None = None):
     return run
 
 
-def scene(task, *, seed, assets, object_name, split="train") -> mujoco.MjModel:
+def scene(config, spec) -> mujoco.MjModel:
     """A scene that fits the fake runner's trajectories: a pendulum of two links."""
     return mujoco.MjModel.from_xml_string("""
     <mujoco>

@@ -12,9 +12,9 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-import fake_episodes as fake
 import pytest
 
+import tests.evaluation.fake_episodes as fake
 from manipose_mj.errors import InputError, WorkerDiedError
 from manipose_mj.evaluation import records, runner
 from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
@@ -65,6 +65,7 @@ def test_every_result_is_on_disk_before_the_next_episode_ends(tmp_path: Path) ->
     assert counts == [(n, n, 12) for n in range(13)]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_kill_and_resume_loses_and_repeats_nothing(tmp_path: Path, jobs: int) -> None:
     out = tmp_path / "out"
@@ -116,7 +117,7 @@ def test_a_last_line_without_its_end_is_not_a_result(tmp_path: Path) -> None:
 def test_resume_of_a_finished_evaluation_runs_nothing(tmp_path: Path) -> None:
     first = evaluate(config(tmp_path), runner=fake.make_runner())
 
-    def never(task, **options):
+    def never(env_config, spec, **options):
         raise AssertionError("ran an episode again")
 
     assert evaluate(config(tmp_path), resume=True, runner=never) == first
@@ -132,7 +133,7 @@ def test_results_are_never_overwritten(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("change", "named"),
-    [({"seed": 1}, "seed"), ({"episodes": 7}, "episodes"), ({"object_name": "bowl"}, "object")],
+    [({"seed": 1}, "seed"), ({"episodes": 7}, "episodes"), ({"objects": ("bowl_000",)}, "objects")],
 )
 def test_resume_refuses_another_configuration(tmp_path: Path, change: dict, named: str) -> None:
     evaluate(config(tmp_path), runner=fake.make_runner())
@@ -176,17 +177,17 @@ def test_a_full_disk_is_an_input_error_and_keeps_what_ended(tmp_path: Path, monk
 
 
 def test_two_evaluations_do_not_share_a_folder(tmp_path: Path) -> None:
-    def nested(task, **options):
+    def nested(env_config, spec, **options):
         with pytest.raises(InputError, match="another evaluation is writing there"):
             evaluate(config(tmp_path), runner=fake.make_runner())
-        return fake.make_runner()(task, **options)
+        return fake.make_runner()(env_config, spec, **options)
 
     evaluate(config(tmp_path, episodes=1), runner=nested)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_wrong_input_in_an_episode_ends_the_evaluation(tmp_path: Path, jobs: int) -> None:
-    def wrong(task, **options):
+    def wrong(env_config, spec, **options):
         raise InputError("unknown object 'mgu'; did you mean mug?")
 
     with pytest.raises(InputError, match="did you mean mug"):
@@ -196,10 +197,10 @@ def test_wrong_input_in_an_episode_ends_the_evaluation(tmp_path: Path, jobs: int
 def test_a_crash_is_one_failed_episode(tmp_path: Path) -> None:
     sound = fake.make_runner()
 
-    def crashing(task, *, episode, **options):
+    def crashing(env_config, spec, *, episode, **options):
         if episode == 2:
             raise FloatingPointError("qacc is\nnot finite")
-        return sound(task, episode=episode, **options)
+        return sound(env_config, spec, episode=episode, **options)
 
     results = evaluate(config(tmp_path), runner=crashing)
     crashed = [r for r in results if r.episode == 2]
@@ -212,8 +213,8 @@ def test_a_crash_is_one_failed_episode(tmp_path: Path) -> None:
 def test_a_number_that_is_not_finite_costs_one_episode(tmp_path: Path) -> None:
     sound = fake.make_runner()
 
-    def infinite(task, *, episode, **options):
-        result, trajectory = sound(task, episode=episode, **options)
+    def infinite(env_config, spec, *, episode, **options):
+        result, trajectory = sound(env_config, spec, episode=episode, **options)
         if episode == 0:
             result = EpisodeResult(**asdict(result) | {"max_penetration": float("nan")})
         return result, trajectory
@@ -227,10 +228,10 @@ def test_a_number_that_is_not_finite_costs_one_episode(tmp_path: Path) -> None:
 def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path: Path) -> None:
     sound = fake.make_runner()
 
-    def deadly(task, *, episode, **options):
+    def deadly(env_config, spec, *, episode, **options):
         if episode == 4:
             os.kill(os.getpid(), signal.SIGKILL)
-        return sound(task, episode=episode, **options)
+        return sound(env_config, spec, episode=episode, **options)
 
     with pytest.raises(WorkerDiedError, match="repeat with --resume"):
         evaluate(config(tmp_path, jobs=2), runner=deadly)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from dm_control import mjcf
 
-from asset_pipeline import catalogue
+from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.arena import TableArena
 from manipose_mj.mjcf.objects import RigidObject
-from manipose_mj.mjcf.panda_geometry import BOXES
+from manipose_mj.mjcf.panda.geometry import BOXES
 from manipose_mj.mjcf.shelf import MIN_GAP, Shelf, ShelfConfig
 from manipose_mj.poses import compose, rotation_about
-from manipose_mj.tasks.resting import pose_on_table
+from manipose_mj.tasks.scene.resting import pose_on_table
 
 STANDING = compose(rotation_about(np.array([0.0, 0.0, 1.0]), 0.3), np.array([0.55, 0.1, 0.0]))
 MUG_UPRIGHT = 2

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from asset_pipeline.catalogue import CATALOGUE
+from manipose_mj.assets import catalogue
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.poses import compose, quaternion_to_rotation
-from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 
 
 def half_visible_clouds(
@@ -16,7 +17,7 @@ def half_visible_clouds(
     rng = np.random.default_rng(seed)
     clouds = []
     for index in indices:
-        specimen = CATALOGUE[category].generate(index)
+        specimen = catalogue.generate(category, index)
         mesh = specimen.bodies[0].surface()
         faces = np.asarray(mesh.triangles)
         for view in range(views):

@@ -7,15 +7,15 @@ import dataclasses
 import jax
 import numpy as np
 import pytest
-from half_visible import half_visible_clouds
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
-from manipose_mj.ppf_jax.model import ModelConfig, PoseModel, estimate_sample
-from manipose_mj.ppf_jax.voting import VotingConfig
-from manipose_mj.ppf_jax.weights import TrainedModel, load_weights, save_weights
+from manipose_mj.ppf_jax.rigid.model import ModelConfig, PoseModel, estimate_sample
+from manipose_mj.ppf_jax.rigid.voting import VotingConfig
+from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
+from tests.ppf_jax.half_visible import half_visible_clouds
 
 KEY = jax.random.key(0)
 CONFIG = ModelConfig(
@@ -53,6 +53,7 @@ def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
     assert traced == [CONFIG.points]
 
 
+@pytest.mark.full
 def test_one_object_is_estimated_as_by_the_whole_model(trained, mug):
     found = PoseEstimator(trained).estimate(mug, key=KEY)
     room = ((0, 256 - len(mug)), (0, 0))
@@ -68,7 +69,7 @@ def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
     first, again = (estimator.estimate(mug, key=KEY) for _ in range(2))
     assert np.array_equal(first.pose, again.pose) and first.confidence == again.confidence
     # 2 X axes with 2 turns each, and the likeliest of what the best may be mistaken for.
-    assert len(first.hypotheses) + 1 == 4 + CONFIG.refinement.related_kept
+    assert len(first.hypotheses) + 1 == 4 + CONFIG.refinement.ambiguous_kept
     assert not first.hypotheses[0].hypotheses
     assert 0 <= first.confidence <= 1 and np.all(first.extents > 0)
 
@@ -88,6 +89,7 @@ def test_other_hypotheses_come_before_what_is_nearly_said_already():
     assert module.distinct_first(poses, axial=False) == [0, 1, 2]
 
 
+@pytest.mark.full
 def test_stray_points_and_bad_normals_give_no_nan(trained, mug):
     rng = np.random.default_rng(0)
     points, normals = mug.points.copy(), mug.normals.copy()
@@ -112,7 +114,7 @@ def _with(points, row, value):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("corrupt", "words"),
     [
         (lambda p: p[:20], "20 points; expected at least 32"),
         (lambda p: p[:, :2], r"shape \(250, 2\)"),
@@ -123,14 +125,16 @@ def _with(points, row, value):
         (lambda p: np.tile(p[:1], (60, 1)), "all points are equal"),
     ],
 )
-def test_a_cloud_that_cannot_be_used_gives_one_line(trained, mug, spoil, words):
+@pytest.mark.usefixtures("wrong_arrays")
+def test_a_cloud_that_cannot_be_used_gives_one_line(trained, mug, corrupt, words):
     with pytest.raises(InputError, match=words) as caught:
-        PoseEstimator(trained).estimate(spoil(mug.points), key=KEY)
+        PoseEstimator(trained).estimate(corrupt(mug.points), key=KEY)
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="cloud 1: "):
-        PoseEstimator(trained).estimate_many([mug, spoil(mug.points)], key=KEY)
+        PoseEstimator(trained).estimate_many([mug, corrupt(mug.points)], key=KEY)
 
 
+@pytest.mark.usefixtures("wrong_arrays")
 def test_normals_must_fit_the_points(trained, mug):
     short = dataclasses.replace(mug, normals=mug.normals[:-1])
     with pytest.raises(InputError, match="normals of shape"):
@@ -175,10 +179,10 @@ def test_a_truncated_file_is_named(trained, tmp_path, kept):
 
 def test_weights_of_another_version_are_named(trained, tmp_path, monkeypatch):
     path = tmp_path / "mug.npz"
-    monkeypatch.setattr("manipose_mj.ppf_jax.weights.FORMAT_VERSION", 99)
+    monkeypatch.setattr("manipose_mj.ppf_jax.weight_files.FORMAT_VERSION", 99)
     save_weights(path, trained)
     monkeypatch.undo()
-    with pytest.raises(InputError, match="weights of format 99; this version reads 1"):
+    with pytest.raises(InputError, match="weights of format 99; this version reads 2"):
         PoseEstimator.from_file(path)
     with pytest.raises(InputError, match="no such file"):
         PoseEstimator.from_file(tmp_path / "none.npz")

@@ -11,10 +11,10 @@ import pytest
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
-from manipose_mj.ppf_jax.clouds import LabelledCloud
-from manipose_mj.ppf_jax.curve_picture import draw_curve
 from manipose_mj.ppf_jax.estimator import PoseEstimate
-from manipose_mj.ppf_jax.evaluation import answers, categories_of
+from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.training.curve_picture import draw_curve
 
 CUP, BOWL = (
     str(resources.files("manipose_mj.ppf_jax") / "weights" / f"{name}.npz")
@@ -33,9 +33,9 @@ CUP, BOWL = (
         (["pose", "train", "axial", "--leave-out", "mug"], "unknown category of axial 'mug'"),
         (["pose", "train", "mug", "--setting", "anywere"], "did you mean anywhere"),
         (["pose", "train", "mug", "--setting"], "--setting names none"),
-        (["pose", "train", "axial", "--grafts", "-1"], "--grafts is -1"),
-        (["pose", "train", "mug", "--grafts", "2"], "objects are made of two of mug"),
-        (["pose", "train", "axial", "--grafts", "2", "--labels", "original"], "no source has"),
+        (["pose", "train", "axial", "--part-swaps", "-1"], "--part-swaps is -1"),
+        (["pose", "train", "mug", "--part-swaps", "2"], "objects are made of two of mug"),
+        (["pose", "train", "axial", "--part-swaps", "2", "--labels", "original"], "no source has"),
         (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),
         (["pose", "average", "a.npz", "--out", "b.npz"], "1 files of weights"),
         (["pose", "average", CUP, "none.npz", "--out", "b.npz"], "none.npz: no such file"),
@@ -65,7 +65,7 @@ class Parrot:
         return PoseEstimate(pose, np.ones(3), float(len(cloud)))
 
     def estimate_many(self, clouds, *, key):
-        assert len(clouds) == 4  # always: another number would compile anew
+        assert len(clouds) == 4  # always: another number would compile again
         return [self.estimate(cloud, key=key) for cloud in clouds]
 
 
@@ -76,7 +76,7 @@ def test_every_cloud_gets_its_own_answer():
         pose, extents = np.eye(4, dtype=np.float32), np.ones(3, np.float32)
         group = SymmetryGroup.identity()
         clouds.append(LabelledCloud(points, points, pose, extents, group, f"a/{i}", "a"))
-    found = answers(Parrot(), clouds, batch=4)  # type: ignore[arg-type]
+    found = predict(Parrot(), clouds, batch=4)  # type: ignore[arg-type]
     np.testing.assert_array_equal(found.poses[:, 0, 3], np.arange(10))
     np.testing.assert_array_equal(found.confidence, 40 + np.arange(10))
     assert found.ms_per_object > 0

@@ -1,4 +1,4 @@
-"""Spoilt clouds make answers worse bit by bit, and never no answers."""
+"""Corrupted clouds make estimates worse bit by bit, and always give one."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from manipose_mj.errors import InputError
-from manipose_mj.ppf_jax.corruption import partly_hidden, with_outliers
+from manipose_mj.ppf_jax.data.augmentation.corruption import partly_hidden, with_outliers
+from manipose_mj.ppf_jax.data.rendering import render_clouds
+from manipose_mj.ppf_jax.data.view_cache import catalogue_subject
+from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.metrics import pose_errors
-from manipose_mj.ppf_jax.outliers import not_alone
-from manipose_mj.ppf_jax.rendering import render_clouds
-from manipose_mj.ppf_jax.view_cache import catalogue_subject
-from manipose_mj.ppf_jax.view_settings import view_setting
+from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors
+from manipose_mj.ppf_jax.points.outlier_removal import not_alone
 
 COUNT = 16
 
@@ -62,10 +62,10 @@ def test_an_edge_hides_one_side_of_the_image():
     assert len(partly_hidden(points, 1.0, rng)) == 3
 
 
-@pytest.mark.parametrize("spoil", [with_outliers, partly_hidden])
-def test_a_share_beyond_all_is_one_line(spoil):
+@pytest.mark.parametrize("corrupt", [with_outliers, partly_hidden])
+def test_a_share_beyond_all_is_one_line(corrupt):
     with pytest.raises(InputError, match="share 1.5; expected one from 0 to 1"):
-        spoil(np.ones((40, 3)), 1.5, np.random.default_rng(0))
+        corrupt(np.ones((40, 3)), 1.5, np.random.default_rng(0))
 
 
 def test_outliers_lie_alone_and_a_surface_does_not(cups):
@@ -77,6 +77,7 @@ def test_outliers_lie_alone_and_a_surface_does_not(cups):
     assert not_alone(np.ones((40, 3))).all()  # no surface at all: nothing is left out
 
 
+@pytest.mark.full
 def test_degradation_is_gradual_and_always_an_answer(cups, estimate):
     rng = np.random.default_rng(0)
     clean = _errors(estimate([cloud.points for cloud in cups]), cups)
@@ -99,8 +100,8 @@ def test_nothing_makes_an_answer_that_is_no_number(cups, estimate):
     plane[:, 2], plane[:, :2] = 0.5, rng.uniform(-0.05, 0.05, (60, 2))
     twice = np.repeat(cups[0].points[:20], 3, axis=0)
     apart = np.concatenate([cups[0].points[:30], cups[0].points[:30] + np.float32(0.4)])
-    strange = [noise, line, plane, twice, apart, partly_hidden(cups[1].points, 0.8, rng)]
-    found = estimate(strange + [cups[0].points] * (COUNT - len(strange)))
+    unusual = [noise, line, plane, twice, apart, partly_hidden(cups[1].points, 0.8, rng)]
+    found = estimate(unusual + [cups[0].points] * (COUNT - len(unusual)))
     for each in found:
         for answer in (each, *each.hypotheses):
             assert np.isfinite(answer.pose).all() and np.isfinite(answer.extents).all()

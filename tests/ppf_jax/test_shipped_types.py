@@ -1,4 +1,4 @@
-"""The weights that ship for whole types do what docs/pose.md says of them."""
+"""The weights that ship for whole types do what docs/guides/pose_estimation.md says of them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from manipose_mj.poses import SymmetryGroup, invert, transform
-from manipose_mj.ppf_jax.clouds import LabelledCloud
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
+from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
-from manipose_mj.ppf_jax.evaluation import answers
-from manipose_mj.ppf_jax.flattened import FlattenedEstimator, agreed
-from manipose_mj.ppf_jax.metrics import pose_errors, summary
-from manipose_mj.ppf_jax.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.view_settings import view_setting
+from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors, summary
+from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion, agreed
 
 FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
 
@@ -33,6 +33,7 @@ def test_a_category_without_weights_gets_its_type_s():
         assert (FOLDER / f"{object_type}.npz").stat().st_size < 2e6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "category", "cm", "deg", "flipped"),
     [
@@ -43,7 +44,7 @@ def test_a_category_without_weights_gets_its_type_s():
 )
 def test_those_of_a_type_reproduce_a_published_figure(name, category, cm, deg, flipped):
     clouds = catalogue_clouds(category, "test", view_setting("anywhere"), views=4, jobs=1)
-    found = answers(PoseEstimator.load(name), clouds, timed=0)
+    found = predict(PoseEstimator.load(name), clouds, timed=0)
     figures = summary(pose_errors(found.poses, clouds))
     assert figures["deg_median"] == pytest.approx(deg, abs=0.1)
     assert figures["origin_cm_median"] == pytest.approx(cm, abs=0.02)
@@ -66,11 +67,12 @@ def flat(cloud: LabelledCloud, share: float) -> LabelledCloud:
     )
 
 
-def test_flat_cans_are_seldom_turned_round():
-    """As docs/pose.md has it: 21 of 32 views by one network, 5 by both; two may be at the edge."""
+@pytest.mark.full
+def test_flat_cans_are_seldom_flipped():
+    """As docs/guides/pose_estimation.md has it: 21 of 32 views by one network, 5 by both; two may be at the edge."""
     round_ones = catalogue_clouds("can", "test", view_setting("anywhere"), views=4, jobs=1)
     clouds = [flat(cloud, 0.6) for cloud in round_ones[:32]]  # those of eight cans
-    both, key = FlattenedEstimator.load("can"), jax.random.fold_in(jax.random.key(0), 0)
+    both, key = TwoNetworkFusion.load("can"), jax.random.fold_in(jax.random.key(0), 0)
     one = both.sides.estimate_many(clouds, key=key)
     ways = both.upright.estimate_many(clouds, key=key)
     flipped = {}

@@ -1,22 +1,17 @@
-"""Let the tests of this folder import their helper modules, and give them tasks."""
+"""Tasks that several files here run over."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import pytest
 from dm_control import composer
 
 from manipose_mj import suite
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 
 @pytest.fixture(scope="module", params=suite.ALL_TASKS, ids="/".join)
 def blind(request) -> composer.Environment:
     """One environment a task, without sensors, for long runs."""
-    return suite.load(*request.param, seed=0, observations="state")
+    return suite.load(*request.param, seed=0, obs_mode="state")
 
 
 @pytest.fixture(
@@ -25,6 +20,6 @@ def blind(request) -> composer.Environment:
 )
 def ideal(request) -> composer.Environment:
     """A task with every observation, none of them noisy."""
-    from observed_scenes import EVERYTHING, load
+    from tests.tasks.observed_scenes import EVERYTHING, load
 
     return load(tuple(request.param.split("/")), EVERYTHING)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from dm_control import composer
 
-from manipose_mj.mjcf.panda import HOME, MAX_OPENING
-from manipose_mj.tasks.base import ManipulationTask
+from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+from manipose_mj.tasks.core.task import ManipulationTask
 
 HOLD = np.append(HOME, MAX_OPENING)
 

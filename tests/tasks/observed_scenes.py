@@ -6,7 +6,7 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj import suite
-from manipose_mj.tasks.observations import MODES, CameraView, PoseNoise, SensorConfig
+from manipose_mj.tasks.observations.sensors import MODES, CameraView, PoseNoise, SensorConfig
 
 TARGET_POSE = ("single_object", "target_pose")
 STORE = ("articulated", "store_chips_can_middle_drawer")
@@ -36,7 +36,7 @@ def load(
     task: tuple[str, str], observations: str, sensors: SensorConfig = SMALL, seed: int = 0
 ) -> composer.Environment:
     """The environment of a task, by domain and name."""
-    return suite.load(*task, seed=seed, observations=observations, sensors=sensors)
+    return suite.load(*task, seed=seed, obs_mode=observations, sensors=sensors)
 
 
 def hold(environment: composer.Environment) -> np.ndarray:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from episode_driver import reset, wander
+
+from tests.tasks.episode_driver import reset, wander
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("seed", range(3))
-def test_random_actions_neither_break_the_physics_nor_push_things_through(blind, seed):
+def test_random_actions_neither_break_the_physics_nor_push_objects_through(blind, seed):
     reset(blind, seed)
     rng, spec = np.random.default_rng(seed), blind.action_spec()
     for _ in range(300):

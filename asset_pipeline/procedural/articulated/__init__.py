@@ -1,0 +1,1 @@
+"""Generators of cabinets, microwaves and ovens, and folders of what they are made of."""

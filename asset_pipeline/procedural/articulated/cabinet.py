@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from asset_pipeline.procedural.articulated.cabinet_kinds import KINDS, beside_a_door
-from asset_pipeline.procedural.articulated.cabinet_sizes import Cabinet
-from asset_pipeline.procedural.articulated.furniture import furniture
-from asset_pipeline.procedural.articulated.pulls import Pull, bar, bow, edge, knob
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.articulated.assembly.furniture import furniture
+from asset_pipeline.procedural.articulated.cabinets.kinds import KINDS, beside_a_door
+from asset_pipeline.procedural.articulated.cabinets.sizes import Cabinet
+from asset_pipeline.procedural.articulated.handles.pulls import Pull, bar, bow, edge, knob
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 
 # Carcass, fronts, inside, handles.
 _COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
@@ -53,8 +53,8 @@ def design(index: int) -> Cabinet:
     plain = KINDS[index % len(KINDS)](rng)
     return replace(
         plain,
-        drawer_friction=drawn(rng, 1.5, 3.0),
-        drawer_damping=drawn(rng, 5.0, 10.0),
+        drawer_friction=uniform(rng, 1.5, 3.0),
+        drawer_damping=uniform(rng, 5.0, 10.0),
         handle=_PULLS[index % len(_PULLS)](rng, metal),
         wood=wood,
         front_rgba=front,

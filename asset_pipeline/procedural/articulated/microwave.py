@@ -16,22 +16,22 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.geometry import Joint, Shape
-from asset_pipeline.procedural.articulated.assembly import (
+from asset_pipeline.procedural.articulated.assembly.parts import (
     Part,
     articulated_specimen,
     moving,
     space_between,
 )
-from asset_pipeline.procedural.articulated.bar_handle import BarHandle
-from asset_pipeline.procedural.articulated.casing import Case, feet, slots
-from asset_pipeline.procedural.articulated.control_panel import Panel, dials, keypad
-from asset_pipeline.procedural.articulated.front_panel import Pane, framed
-from asset_pipeline.procedural.articulated.mounted import Handle
-from asset_pipeline.procedural.articulated.portion import weighing
-from asset_pipeline.procedural.articulated.pulls import bar, bow, edge
-from asset_pipeline.procedural.articulated.turntable import TOP, turntable
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.articulated.cabinets.front_panel import Pane, framed
+from asset_pipeline.procedural.articulated.handles.bar_handle import BarHandle
+from asset_pipeline.procedural.articulated.handles.mounted import Handle
+from asset_pipeline.procedural.articulated.handles.portion import weighing
+from asset_pipeline.procedural.articulated.handles.pulls import bar, bow, edge
+from asset_pipeline.procedural.articulated.ovens.casing import Case, feet, slots
+from asset_pipeline.procedural.articulated.ovens.control_panel import Panel, dials, keypad
+from asset_pipeline.procedural.articulated.ovens.turntable import TOP, turntable
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Joint, Shape
 
 GLASS = 2500.0  # [kg/m^3]
 RUBBER: Colour = (0.10, 0.10, 0.10, 1.0)
@@ -118,11 +118,11 @@ def design(index: int) -> Microwave:
         return Microwave()
     rng = specimen_rng("microwave", index)
     case, front, panel, lining, metal = in_turn(index, _COLOURS)
-    width = drawn(rng, 0.432, 0.560)
-    height = drawn(rng, 0.245, 0.262 + 0.35 * (width - 0.432))
-    depth = drawn(rng, 0.300, 0.330 + 0.6 * (width - 0.432))
-    side, back = drawn(rng, 0.018, 0.026), drawn(rng, 0.030, 0.045)
-    beside = drawn(rng, 0.105, 0.105 + 0.18 * (width - 0.350))
+    width = uniform(rng, 0.432, 0.560)
+    height = uniform(rng, 0.245, 0.262 + 0.35 * (width - 0.432))
+    depth = uniform(rng, 0.300, 0.330 + 0.6 * (width - 0.432))
+    side, back = uniform(rng, 0.018, 0.026), uniform(rng, 0.030, 0.045)
+    beside = uniform(rng, 0.105, 0.105 + 0.18 * (width - 0.350))
     room = min(width - beside - 2 * side, depth - back) - 0.020
     bars = bar((0.60 * height, 0.80 * height), thickness=(0.012, 0.015), standoff=(0.028, 0.034))
     pulls = (bars, bow((0.58 * height, 0.75 * height)), bars, edge((0.55 * height, 0.85 * height)))
@@ -130,18 +130,18 @@ def design(index: int) -> Microwave:
         width=width,
         height=height,
         depth=depth,
-        feet=drawn(rng, 0.008, 0.016),
-        door=drawn(rng, 0.030, 0.038),
+        feet=uniform(rng, 0.008, 0.016),
+        door=uniform(rng, 0.030, 0.038),
         panel=beside,
         side=side,
         back=back,
-        rail=drawn(rng, 0.034, 0.048),
+        rail=uniform(rng, 0.034, 0.048),
         hinge="right" if rng.random() < 0.2 else "left",
-        plate=min(room, drawn(rng, 0.245, 0.330)),
+        plate=min(room, uniform(rng, 0.245, 0.330)),
         controls="dials" if rng.random() < 0.4 else "keys",
         mass=round(10.0 + 5.0 * (width - 0.432) / 0.128 + float(rng.uniform(-0.5, 0.5)), 2),
-        friction=drawn(rng, 0.30, 0.45),
-        damping=drawn(rng, 0.25, 0.40),
+        friction=uniform(rng, 0.30, 0.45),
+        damping=uniform(rng, 0.25, 0.40),
         time=f"{rng.integers(10, 24):02d}:{rng.integers(0, 60):02d}",
         handle=pulls[index % len(pulls)](rng, metal),
         case_rgba=case,
@@ -154,8 +154,8 @@ def design(index: int) -> Microwave:
 def generate(index: int = 0) -> Specimen:
     """Instance `index`, shut."""
     microwave = design(index)
-    solid, looks = _base(microwave)
-    return articulated_specimen([weighing(looks, solid, microwave.mass)], [_door(microwave)])
+    solid, visuals = _base(microwave)
+    return articulated_specimen([weighing(visuals, solid, microwave.mass)], [_door(microwave)])
 
 
 def _case(m: Microwave) -> Case:
@@ -184,19 +184,19 @@ def _base(m: Microwave) -> tuple[list[Shape], list[Shape]]:
     stand = feet(case.low, case.high, rgba=RUBBER)
     floor = (case.inner_low + case.inner_high) / 2
     floor[2] = case.inner_low[2]
-    plate_looks, plate = turntable(floor, m.plate)
+    plate_visuals, plate = turntable(floor, m.plate)
     details, knobs = _controls(m, panel)
     side = np.array([0.12 * m.depth, m.sign * -m.width / 2, m.feet + 0.68 * m.height])
-    looks = [
-        *case.looks(),
+    visuals = [
+        *case.visuals(),
         panel.solid(),
         *stand,
-        *plate_looks,
+        *plate_visuals,
         *details,
         slots(side, 1, (0.030, 0.003), count=14, pitch=0.008),
         slots(side - [0, 0, 0.05], 1, (0.030, 0.003), count=14, pitch=0.008),
     ]
-    return [*case.solid(), panel.solid(), *stand, *plate, *knobs], looks
+    return [*case.solid(), panel.solid(), *stand, *plate, *knobs], visuals
 
 
 def _controls(m: Microwave, panel: Panel) -> tuple[list[Shape], list[Shape]]:

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from asset_pipeline.procedural.articulated.mounted import Handle
-from asset_pipeline.procedural.articulated.oven_body import Oven, oven_specimen
-from asset_pipeline.procedural.articulated.pulls import bar, bow
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.articulated.handles.mounted import Handle
+from asset_pipeline.procedural.articulated.handles.pulls import bar, bow
+from asset_pipeline.procedural.articulated.ovens.oven_body import Oven, oven_specimen
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 
 # Case, door, panel, lining, handle.
 _COLOURS: tuple[tuple[Colour, Colour, Colour, Colour, Colour], ...] = (
@@ -39,7 +39,7 @@ def design(index: int) -> Oven:
     sized = _table_top(rng, metal) if table_top else _built_in(rng, metal)
     return Oven(
         **sized,
-        bars=drawn(rng, 0.020, 0.030),
+        bars=uniform(rng, 0.020, 0.030),
         case_rgba=case,
         front_rgba=front,
         panel_rgba=panel,
@@ -53,53 +53,53 @@ def generate(index: int = 0) -> Specimen:
 
 
 def _table_top(rng: np.random.Generator, metal: Colour) -> dict:
-    width = drawn(rng, 0.452, 0.550)
-    height = drawn(rng, 0.285, 0.310 + 0.35 * (width - 0.452))
-    panel = drawn(rng, 0.095, 0.130) if rng.random() < 0.75 else 0.0
+    width = uniform(rng, 0.452, 0.550)
+    height = uniform(rng, 0.285, 0.310 + 0.35 * (width - 0.452))
+    panel = uniform(rng, 0.095, 0.130) if rng.random() < 0.75 else 0.0
     return {
         "width": width,
         "height": height,
-        "depth": drawn(rng, 0.310, 0.390),
-        "feet": drawn(rng, 0.012, 0.020),
-        "door": drawn(rng, 0.020, 0.024),
-        "sill": drawn(rng, 0.064, 0.070),
-        "top": drawn(rng, 0.018, 0.026) if panel else drawn(rng, 0.050, 0.058),
+        "depth": uniform(rng, 0.310, 0.390),
+        "feet": uniform(rng, 0.012, 0.020),
+        "door": uniform(rng, 0.020, 0.024),
+        "sill": uniform(rng, 0.064, 0.070),
+        "top": uniform(rng, 0.018, 0.026) if panel else uniform(rng, 0.050, 0.058),
         "panel": panel,
-        "rail": drawn(rng, 0.022, 0.034),
-        "rack": drawn(rng, 0.030, 0.044),
+        "rail": uniform(rng, 0.022, 0.034),
+        "rack": uniform(rng, 0.030, 0.044),
         "heaters": True,
         "dials": int(rng.integers(2, 4 + bool(panel))),
-        "friction": drawn(rng, 0.30, 0.45),
-        "damping": drawn(rng, 0.5, 0.8),
+        "friction": uniform(rng, 0.30, 0.45),
+        "damping": uniform(rng, 0.5, 0.8),
         "mass": round(6.5 + 5.0 * (width - 0.452) / 0.098 + float(rng.uniform(-0.4, 0.4)), 2),
-        "handle": _pull(rng, round((width - panel) * drawn(rng, 0.62, 0.82), 4), 0.026, metal),
+        "handle": _pull(rng, round((width - panel) * uniform(rng, 0.62, 0.82), 4), 0.026, metal),
     }
 
 
 def _built_in(rng: np.random.Generator, metal: Colour) -> dict:
     compact = rng.random() < 0.35
-    height = drawn(rng, 0.440, 0.456) if compact else drawn(rng, 0.585, 0.600)
-    width = drawn(rng, 0.555, 0.600)
+    height = uniform(rng, 0.440, 0.456) if compact else uniform(rng, 0.585, 0.600)
+    width = uniform(rng, 0.555, 0.600)
     return {
         "width": width,
         "height": height,
-        "depth": drawn(rng, 0.480, 0.545),
+        "depth": uniform(rng, 0.480, 0.545),
         "feet": 0.0,
-        "door": drawn(rng, 0.030, 0.036),
-        "sill": drawn(rng, 0.092, 0.100),
-        "top": drawn(rng, 0.085, 0.105),
+        "door": uniform(rng, 0.030, 0.036),
+        "sill": uniform(rng, 0.092, 0.100),
+        "top": uniform(rng, 0.085, 0.105),
         "panel": 0.0,
-        "side": drawn(rng, 0.045, 0.060),
-        "back": drawn(rng, 0.060, 0.090),
-        "rail": drawn(rng, 0.045, 0.060),
-        "rack": drawn(rng, 0.075, 0.110),
+        "side": uniform(rng, 0.045, 0.060),
+        "back": uniform(rng, 0.060, 0.090),
+        "rail": uniform(rng, 0.045, 0.060),
+        "rack": uniform(rng, 0.075, 0.110),
         "heaters": False,
         "dials": int(rng.integers(2, 5)),
         "time": f"{rng.integers(10, 24):02d}:{rng.integers(0, 60):02d}",
-        "friction": drawn(rng, 0.6, 1.0),
-        "damping": drawn(rng, 1.2, 1.8),
+        "friction": uniform(rng, 0.6, 1.0),
+        "damping": uniform(rng, 1.2, 1.8),
         "mass": round((22.0 if compact else 26.0) + float(rng.uniform(0, 4)), 2),
-        "handle": _pull(rng, round(width * drawn(rng, 0.66, 0.84), 4), 0.032, metal),
+        "handle": _pull(rng, round(width * uniform(rng, 0.66, 0.84), 4), 0.032, metal),
     }
 
 

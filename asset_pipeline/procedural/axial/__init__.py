@@ -1,0 +1,1 @@
+"""Generators of objects that are symmetric about an axis, one module for each category."""

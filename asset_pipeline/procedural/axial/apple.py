@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through, lathe, revolved_mass, wall_wedges
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 FLESH, WOOD = 820.0, 600.0  # [kg/m^3]
@@ -57,10 +57,10 @@ def design(index: int) -> Apple:
     rng = specimen_rng("apple", index)
     skin, blush = in_turn(index, _SORTS)
     return Apple(
-        width=drawn(rng, 0.063, 0.0755),
-        flatness=drawn(rng, 0.77, 0.83),
-        shoulder=drawn(rng, 0.50, 0.62),
-        stalk=drawn(rng, 0.008, 0.0105),
+        width=uniform(rng, 0.063, 0.0755),
+        flatness=uniform(rng, 0.77, 0.83),
+        shoulder=uniform(rng, 0.50, 0.62),
+        stalk=uniform(rng, 0.008, 0.0105),
         skin=skin,
         blush=blush,
     )

@@ -16,7 +16,14 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from manipose_mj.poses import SymmetryGroup
 
 CONTENT = 430.0  # mean of wall, content and air [kg/m^3]
@@ -120,11 +127,11 @@ def design(index: int) -> Bottle:
     label, stripe, lid = in_turn(index, _LABELS)
     bottle = Bottle(
         cap=kind.cap,
-        diameter=drawn(rng, *kind.diameter),
-        height=drawn(rng, *kind.height),
-        neck=drawn(rng, *kind.neck),
-        shoulder=drawn(rng, *kind.shoulder),
-        throat=drawn(rng, *kind.throat),
+        diameter=uniform(rng, *kind.diameter),
+        height=uniform(rng, *kind.height),
+        neck=uniform(rng, *kind.neck),
+        shoulder=uniform(rng, *kind.shoulder),
+        throat=uniform(rng, *kind.throat),
         body=in_turn(index // len(_KINDS) + 1, kind.bodies),
         label=label,
         stripe=stripe,

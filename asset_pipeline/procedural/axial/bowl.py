@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asset_pipeline.procedural.pieces import rigid_specimen
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import CURVE_POINTS, Glaze, bent_wall, disc, vessel
 from manipose_mj.poses import SymmetryGroup
 
@@ -61,9 +61,9 @@ def design(index: int) -> Bowl:
     return Bowl(
         diameter=round(float(diameter), 4),
         height=round(float(np.clip(diameter * rng.uniform(0.36, 0.50), 0.045, 0.075)), 4),
-        wall=round(float(rng.uniform(0.0034, 0.005)), 4),
+        wall=uniform(rng, 0.0034, 0.005),
         foot=round(float(diameter * rng.uniform(0.42, 0.50)), 4),
-        ring=round(float(rng.uniform(0.005, 0.007)), 4),
+        ring=uniform(rng, 0.005, 0.007),
         bend=(round(float(rng.uniform(0.58, 0.70)), 3), round(float(rng.uniform(0.19, 0.30)), 3)),
         outside=outside,
         inside=inside,

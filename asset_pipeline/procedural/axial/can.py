@@ -14,14 +14,14 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.filled import frusta
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass
 from asset_pipeline.procedural.solids import ellipse, print_on_face
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.turned import banded
 from asset_pipeline.procedural.vessel import Wall, wall_rings
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 METAL: Colour = (0.78, 0.79, 0.81, 1.0)
@@ -69,24 +69,24 @@ def design(index: int) -> Can:
     body, band = in_turn(index, _BRANDS)
     if index % 2 == 0:
         diameter, height = in_turn(index // 2, _DRINKS)
-        diameter += drawn(rng, -0.0004, 0.0004)
+        diameter += uniform(rng, -0.0004, 0.0004)
         return Can(
             diameter=diameter,
-            height=height + drawn(rng, -0.002, 0.002),
-            lid=diameter - drawn(rng, 0.0110, 0.0130),
-            stand=diameter - drawn(rng, 0.0185, 0.0205),
-            dome=drawn(rng, 0.0085, 0.0105),
+            height=height + uniform(rng, -0.002, 0.002),
+            lid=diameter - uniform(rng, 0.0110, 0.0130),
+            stand=diameter - uniform(rng, 0.0185, 0.0205),
+            dome=uniform(rng, 0.0085, 0.0105),
             body=body,
             band=band,
         )
-    lid = drawn(rng, 0.0640, 0.0735)
+    lid = uniform(rng, 0.0640, 0.0735)
     return Can(
         kind="food",
         diameter=lid - 0.0016,
-        height=drawn(rng, 0.060, 0.115),
+        height=uniform(rng, 0.060, 0.115),
         lid=lid,
-        stand=lid - drawn(rng, 0.0085, 0.0105),
-        dome=drawn(rng, 0.0045, 0.0060),
+        stand=lid - uniform(rng, 0.0085, 0.0105),
+        dome=uniform(rng, 0.0045, 0.0060),
         body=body,
         band=band,
     )

@@ -15,7 +15,14 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.vessel import Glaze, disc, rings, upright_wall, vessel, wall_rings
 from manipose_mj.poses import SymmetryGroup
 
@@ -70,13 +77,13 @@ def design(index: int) -> Candle:
         "votive": ((0.042, 0.054), (1.05, 1.35)),
         "glass": ((0.064, 0.074), (1.15, 1.40)),
     }[kind]
-    diameter = drawn(rng, *wide)
+    diameter = uniform(rng, *wide)
     return Candle(
         kind=kind,
         diameter=diameter,
-        height=round(min(diameter * drawn(rng, *tall), 0.186), 4),
-        edge=drawn(rng, 0.004, 0.008),
-        wick=drawn(rng, 0.0085, 0.012),
+        height=round(min(diameter * uniform(rng, *tall), 0.186), 4),
+        edge=uniform(rng, 0.004, 0.008),
+        wick=uniform(rng, 0.0085, 0.012),
         wax=in_turn(index, _WAXES),
         band=in_turn(index, _BANDS) if kind in ("pillar", "votive") else None,
     )

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Body, MassProperties, Shape
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import combine
+from asset_pipeline.geometry.mass import combine
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass
 from asset_pipeline.procedural.solids import ellipse, print_on_cylinder
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Body, MassProperties, Shape
+from manipose_mj.assets.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup
 
 YCB_MASS = 0.205  # [kg], with its chips
@@ -60,7 +60,7 @@ def design(index: int) -> ChipsCan:
     rng = specimen_rng("chips_can", index)
     body, band, lid = in_turn(index, _FLAVOURS)
     return ChipsCan(
-        diameter=round(float(rng.uniform(0.066, 0.076)), 4),
+        diameter=uniform(rng, 0.066, 0.076),
         height=round(float(rng.uniform(0.150, 0.255)), 3),
         body=body,
         band=band,
@@ -75,7 +75,7 @@ def generate(index: int = 0) -> Specimen:
     body = Body(
         name="chips_can",
         collision=(Shape("cylinder", (radius, half)),),
-        visual=_looks(can),
+        visual=_visuals(can),
         mass_properties=_mass(can),
         friction=FRICTION,
     )
@@ -90,7 +90,7 @@ def generate(index: int = 0) -> Specimen:
     return Specimen(label, (body,))
 
 
-def _looks(can: ChipsCan) -> tuple[Shape, ...]:
+def _visuals(can: ChipsCan) -> tuple[Shape, ...]:
     r, tube, half = can.diameter / 2, can.diameter / 2 - can.step, can.height / 2
     seam, lid = -half + can.rim, half - can.lid_height
     length = lid - seam

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from asset_pipeline.procedural.pieces import rigid_specimen
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import (
     Glaze,
     Wall,
@@ -86,12 +86,12 @@ def design(index: int) -> Cup:
     kind: Kind = in_turn(index, _KINDS)
     turn = index // 4 + 1
     if kind == "paper":
-        width = drawn(rng, 0.076, 0.090)
+        width = uniform(rng, 0.076, 0.090)
         return Cup(
             kind,
             width=width,
-            height=drawn(rng, 1.12 * width, 1.52 * width),
-            foot=drawn(rng, 0.64, 0.70),
+            height=uniform(rng, 1.12 * width, 1.52 * width),
+            foot=uniform(rng, 0.64, 0.70),
             wall=0.0022,
             bead=0.0018,
             ledge=0.0,
@@ -101,13 +101,13 @@ def design(index: int) -> Cup:
         )
     if kind == "beaker":
         body, band = in_turn(turn, _GLAZES)
-        width = drawn(rng, 0.066, 0.084)
+        width = uniform(rng, 0.066, 0.084)
         return Cup(
             kind,
             width=width,
-            height=drawn(rng, 0.98 * width, 1.36 * width),
-            foot=drawn(rng, 0.60, 0.72),
-            wall=drawn(rng, 0.0036, 0.0046),
+            height=uniform(rng, 0.98 * width, 1.36 * width),
+            foot=uniform(rng, 0.60, 0.72),
+            wall=uniform(rng, 0.0036, 0.0046),
             bead=0.0,
             ledge=0.0,
             body=body,
@@ -115,16 +115,16 @@ def design(index: int) -> Cup:
             inside=band,
         )
     body = in_turn(turn + index % 4, _PLASTICS)
-    width = drawn(rng, 0.062, 0.088)
+    width = uniform(rng, 0.062, 0.088)
     red, green, blue, _ = np.minimum(np.array(body) + 0.08, 1.0).tolist()
     return Cup(
         kind,
         width=width,
-        height=drawn(rng, max(0.072, 1.02 * width), 1.6 * width),
-        foot=drawn(rng, 0.64, 0.78),
-        wall=drawn(rng, 0.0022, 0.0030),
-        bead=drawn(rng, 0.0012, 0.0018),
-        ledge=drawn(rng, 0.62, 0.80),
+        height=uniform(rng, max(0.072, 1.02 * width), 1.6 * width),
+        foot=uniform(rng, 0.64, 0.78),
+        wall=uniform(rng, 0.0022, 0.0030),
+        bead=uniform(rng, 0.0012, 0.0018),
+        ledge=uniform(rng, 0.62, 0.80),
         body=body,
         band=body,
         inside=(red, green, blue, 1.0),

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.solids import ellipse, print_on_face
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import Glaze, Wall, disc, rings, upright_wall, vessel
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 CLAY = 1850.0  # porous earthenware [kg/m^3]
@@ -59,17 +59,17 @@ def design(index: int) -> FlowerPot:
         return FlowerPot()
     rng = specimen_rng("flower_pot", index)
     body, rim = in_turn(index, _GLAZES)
-    width = drawn(rng, 0.080, 0.140)
+    width = uniform(rng, 0.080, 0.140)
     low = index % 4 == 3
     return FlowerPot(
         width=width,
-        height=drawn(rng, 0.66 * width, 0.74 * width)
+        height=uniform(rng, 0.66 * width, 0.74 * width)
         if low
-        else drawn(rng, 0.84 * width, 1.02 * width),
-        foot=drawn(rng, 0.60, 0.72),
-        wall=drawn(rng, 0.0042, 0.0054),
-        collar=drawn(rng, 0.20, 0.32),
-        ledge=drawn(rng, 0.0024, 0.0040),
+        else uniform(rng, 0.84 * width, 1.02 * width),
+        foot=uniform(rng, 0.60, 0.72),
+        wall=uniform(rng, 0.0042, 0.0054),
+        collar=uniform(rng, 0.20, 0.32),
+        ledge=uniform(rng, 0.0024, 0.0040),
         body=body,
         rim=rim,
         inside=(0.62, 0.33, 0.20, 1.0) if index % 3 else rim,

@@ -14,7 +14,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from manipose_mj.poses import SymmetryGroup
 
 FULL, LID = 950.0, 450.0  # mean of glass, content and air; of a hollow lid [kg/m^3]
@@ -56,13 +56,13 @@ def design(index: int) -> Jar:
         return Jar()
     rng = specimen_rng("jar", index)
     content, label, metal = in_turn(index, _PRODUCTS)
-    diameter = drawn(rng, 0.048, 0.074)
+    diameter = uniform(rng, 0.048, 0.074)
     return Jar(
         diameter=diameter,
-        height=drawn(rng, max(0.066, 1.08 * diameter), 2.1 * diameter),
-        lid=diameter - drawn(rng, 0.006, min(0.016, 0.22 * diameter)),
-        cover=drawn(rng, 0.010, 0.020),
-        knob=drawn(rng, 0.012, 0.018) if index % 6 == 4 else 0.0,
+        height=uniform(rng, max(0.066, 1.08 * diameter), 2.1 * diameter),
+        lid=diameter - uniform(rng, 0.006, min(0.016, 0.22 * diameter)),
+        cover=uniform(rng, 0.010, 0.020),
+        knob=uniform(rng, 0.012, 0.018) if index % 6 == 4 else 0.0,
         content=content,
         label=label,
         metal=metal,

@@ -14,7 +14,14 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through, revolved_mass
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from manipose_mj.poses import SymmetryGroup
 
 TURNS = 5  # of the screw's thread that show
@@ -68,11 +75,11 @@ def design(index: int) -> LightBulb:
     led = shape in "AG" and index % 3 != 0
     return LightBulb(
         shape=shape,
-        width=drawn(rng, *_WIDTHS[shape]),
-        length=drawn(rng, *_LENGTHS[shape]),
+        width=uniform(rng, *_WIDTHS[shape]),
+        length=uniform(rng, *_LENGTHS[shape]),
         screw=0.0139 if small else 0.0265,
         led=led,
-        mass=drawn(rng, 0.045, 0.085) if led else drawn(rng, 0.020, 0.045),
+        mass=uniform(rng, 0.045, 0.085) if led else uniform(rng, 0.020, 0.045),
         glass=OPAL if led else in_turn(index, (CLEAR, OPAL, AMBER)),
         shell=in_turn(index, (NICKEL, BRASS)),
     )

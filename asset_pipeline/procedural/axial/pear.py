@@ -13,7 +13,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from manipose_mj.poses import SymmetryGroup
 
 FLESH, WOOD = 950.0, 600.0  # [kg/m^3]
@@ -51,10 +51,10 @@ def design(index: int) -> Pear:
     rng = specimen_rng("pear", index)
     skin, crown = in_turn(index, _SORTS)
     return Pear(
-        width=drawn(rng, 0.056, 0.072),
-        slimness=drawn(rng, 1.22, 1.52),
-        neck=drawn(rng, 0.42, 0.58),
-        stalk=drawn(rng, 0.010, 0.016),
+        width=uniform(rng, 0.056, 0.072),
+        slimness=uniform(rng, 1.22, 1.52),
+        neck=uniform(rng, 0.42, 0.58),
+        stalk=uniform(rng, 0.010, 0.016),
         skin=skin,
         crown=crown,
     )

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import lathe
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import Glaze, bent_wall, disc, joints, rings, vessel
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 PORCELAIN, MELAMINE = 2350.0, 1500.0  # [kg/m^3]
@@ -61,14 +61,14 @@ def design(index: int) -> Plate:
     rng = specimen_rng("plate", index)
     glaze, paint = in_turn(index + index // 6, _GLAZES)
     light = index % 3 == 0
-    diameter = drawn(rng, 0.165, 0.240)
+    diameter = uniform(rng, 0.165, 0.240)
     first = int(rng.integers(8, 13))
     return Plate(
         diameter=diameter,
-        height=drawn(rng, max(0.030, 0.145 * diameter), 0.185 * diameter),
-        wall=drawn(rng, 0.0028, 0.0034) if light else drawn(rng, 0.0030, 0.0040),
-        foot=drawn(rng, 0.58, 0.68),
-        bend=(drawn(rng, 0.70, 0.84), drawn(rng, 0.05, 0.14)),
+        height=uniform(rng, max(0.030, 0.145 * diameter), 0.185 * diameter),
+        wall=uniform(rng, 0.0028, 0.0034) if light else uniform(rng, 0.0030, 0.0040),
+        foot=uniform(rng, 0.58, 0.68),
+        bend=(uniform(rng, 0.70, 0.84), uniform(rng, 0.05, 0.14)),
         density=MELAMINE if light else PORCELAIN,
         glaze=glaze,
         paint=paint,

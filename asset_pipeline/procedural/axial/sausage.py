@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import lathe, revolved_mass
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import disc
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 MEAT = 1030.0  # [kg/m^3]
@@ -51,11 +51,11 @@ def design(index: int) -> Sausage:
         return Sausage()
     rng = specimen_rng("sausage", index)
     meat, casing = in_turn(index, _SORTS)
-    diameter = drawn(rng, 0.018, 0.034)
+    diameter = uniform(rng, 0.018, 0.034)
     return Sausage(
         diameter=diameter,
-        length=drawn(rng, max(0.082, 4.2 * diameter), min(0.200, 7.5 * diameter)),
-        knot=drawn(rng, 0.004, 0.009),
+        length=uniform(rng, max(0.082, 4.2 * diameter), min(0.200, 7.5 * diameter)),
+        knot=uniform(rng, 0.004, 0.009),
         meat=meat,
         casing=casing,
     )
@@ -74,13 +74,13 @@ def generate(index: int = 0) -> Specimen:
     knot = np.column_stack([np.array([1, 0.8, 1.15, 1.25, 0.9, 0]) * twist, knot])
     upper = np.concatenate([arc, knot[1:]])
     profile = np.concatenate([upper[::-1] * [1, -1], upper])
-    looks = (
+    visuals = (
         (knot[::-1] * [1, -1], sausage.casing),
         (profile[len(knot) - 1 : 1 - len(knot)], sausage.meat),
         (knot, sausage.casing),
     )
     piece = Piece(
-        tuple(Shape("mesh", mesh=lathe(part, 40), rgba=rgba) for part, rgba in looks),
+        tuple(Shape("mesh", mesh=lathe(part, 40), rgba=rgba) for part, rgba in visuals),
         (
             Shape("capsule", (radius, centre)),
             disc(1.1 * twist, -tip, -centre - 0.8 * radius),

@@ -11,10 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet, lathe, revolved_mass, wall_wedges
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 WOUND, CARDBOARD = 950.0, 700.0  # [kg/m^3]
@@ -44,7 +51,7 @@ class _Kind:
     core: tuple[float, float]
     diameter: tuple[float, float]
     width: tuple[float, float]
-    looks: tuple[tuple[Colour, Colour], ...]
+    colours: tuple[tuple[Colour, Colour], ...]
 
 
 _KINDS = (
@@ -87,12 +94,12 @@ def design(index: int) -> Tape:
         return Tape()
     rng = specimen_rng("tape", index)
     kind = in_turn(mixed(index), _KINDS)
-    tape, cardboard = in_turn(index // len(_KINDS) + 1, kind.looks)
+    tape, cardboard = in_turn(index // len(_KINDS) + 1, kind.colours)
     return Tape(
-        diameter=drawn(rng, *kind.diameter),
-        core=drawn(rng, *kind.core),
-        width=drawn(rng, *kind.width),
-        ring=drawn(rng, 0.0028, 0.004),
+        diameter=uniform(rng, *kind.diameter),
+        core=uniform(rng, *kind.core),
+        width=uniform(rng, *kind.width),
+        ring=uniform(rng, 0.0028, 0.004),
         tape=tape,
         cardboard=cardboard,
     )

@@ -13,7 +13,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from manipose_mj.poses import SymmetryGroup
 
 DOUBLE_WALL, CUP = 400.0, 380.0  # mean densities of empty flask and hollow cup [kg/m^3]
@@ -39,7 +39,7 @@ class Thermos:
     lid: Colour = STEEL
 
 
-_LOOKS: tuple[tuple[Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour], ...] = (
     ((0.72, 0.73, 0.75, 1.0), DARK),
     ((0.12, 0.22, 0.42, 1.0), STEEL),
     ((0.66, 0.12, 0.12, 1.0), DARK),
@@ -54,16 +54,16 @@ def design(index: int) -> Thermos:
     if index == 0:
         return Thermos()
     rng = specimen_rng("thermos", index)
-    body, lid = in_turn(index + index // 6, _LOOKS)
-    diameter = drawn(rng, 0.062, 0.0735)
+    body, lid = in_turn(index + index // 6, _COLOURS)
+    diameter = uniform(rng, 0.062, 0.0735)
     narrow = index % 3 == 2
     return Thermos(
         diameter=diameter,
-        height=drawn(rng, 2.75 * diameter, min(0.315, 4.4 * diameter)),
-        cup=drawn(rng, 0.040, 0.048) if narrow else diameter - drawn(rng, 0.005, 0.012),
-        cover=drawn(rng, 0.026, 0.040) if narrow else drawn(rng, 0.048, 0.072),
-        taper=drawn(rng, 0.001, 0.004) if narrow else drawn(rng, 0.005, 0.012),
-        shoulder=drawn(rng, 0.020, 0.032),
+        height=uniform(rng, 2.75 * diameter, min(0.315, 4.4 * diameter)),
+        cup=uniform(rng, 0.040, 0.048) if narrow else diameter - uniform(rng, 0.005, 0.012),
+        cover=uniform(rng, 0.026, 0.040) if narrow else uniform(rng, 0.048, 0.072),
+        taper=uniform(rng, 0.001, 0.004) if narrow else uniform(rng, 0.005, 0.012),
+        shoulder=uniform(rng, 0.020, 0.032),
         body=body,
         lid=lid,
     )

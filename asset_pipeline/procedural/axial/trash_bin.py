@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from asset_pipeline.procedural.pieces import rigid_specimen
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import Glaze, Wall, disc, rings, upright_wall, vessel
 from manipose_mj.poses import SymmetryGroup
 
@@ -64,17 +64,17 @@ def design(index: int) -> TrashBin:
     body = in_turn(index, _COLOURS)
     red, green, blue, _ = (0.72 * np.array(body)).tolist()
     dark = (red, green, blue, 1.0)
-    width = drawn(rng, 0.115, 0.200)
+    width = uniform(rng, 0.115, 0.200)
     return TrashBin(
         kind,
         width=width,
-        height=drawn(rng, 1.14 * width, min(1.42 * width, 0.265)),
-        foot=drawn(rng, 0.70, 0.86),
-        wall=drawn(rng, 0.0024, 0.0030),
+        height=uniform(rng, 1.14 * width, min(1.42 * width, 0.265)),
+        foot=uniform(rng, 0.70, 0.86),
+        wall=uniform(rng, 0.0024, 0.0030),
         top={
-            "rim": drawn(rng, 0.007, 0.012),
-            "bag": drawn(rng, 0.030, 0.050),
-            "lid": drawn(rng, 0.030, 0.042),
+            "rim": uniform(rng, 0.007, 0.012),
+            "bag": uniform(rng, 0.030, 0.050),
+            "lid": uniform(rng, 0.030, 0.042),
         }[kind],
         body=body,
         upper={"rim": body, "bag": BAG, "lid": dark}[kind],

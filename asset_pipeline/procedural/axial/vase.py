@@ -12,7 +12,7 @@ import numpy as np
 
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import Glaze, disc, joints, rings, upright_wall, vessel
 from manipose_mj.poses import SymmetryGroup
 
@@ -83,18 +83,18 @@ def design(index: int) -> Vase:
     rng = specimen_rng("vase", index)
     shape = in_turn(index, ("solitaire", "trumpet", "belly", "baluster"))
     glaze, band = in_turn(index, _GLAZES)
-    width = drawn(rng, *_WIDTHS[shape])
-    start = drawn(rng, 0.15, 0.75)
+    width = uniform(rng, *_WIDTHS[shape])
+    start = uniform(rng, 0.15, 0.75)
     return Vase(
         shape=shape,
         width=width,
-        height=round(width * drawn(rng, *_SLIMNESS[shape]), 4),
-        wall=drawn(rng, 0.0032, 0.0042),
-        throat=drawn(rng, -0.02, 0.08),
+        height=round(width * uniform(rng, *_SLIMNESS[shape]), 4),
+        wall=uniform(rng, 0.0032, 0.0042),
+        throat=uniform(rng, -0.02, 0.08),
         glaze=glaze,
         band=band,
         inside=in_turn(index, (glaze, band)),
-        bands=(start, start + drawn(rng, 0.04, 0.16)),
+        bands=(start, start + uniform(rng, 0.04, 0.16)),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from asset_pipeline.procedural.filled import filled
 from asset_pipeline.procedural.pieces import rigid_specimen
 from asset_pipeline.procedural.revolution import curve_through
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.vessel import Glaze, Wall, joints, rings, vessel
 from manipose_mj.poses import SymmetryGroup
 
@@ -69,16 +69,16 @@ def design(index: int) -> WineGlass:
     rng = specimen_rng("wine_glass", index)
     shape = in_turn(index, ("white", "flute", "red"))
     glass, tint = in_turn(index, _TINTS)
-    width = drawn(rng, *_WIDTHS[shape])
-    bowl = round(width * drawn(rng, *_SLIMNESS[shape]), 4)
+    width = uniform(rng, *_WIDTHS[shape])
+    bowl = round(width * uniform(rng, *_SLIMNESS[shape]), 4)
     return WineGlass(
         shape=shape,
         width=width,
         bowl=bowl,
-        stem=drawn(rng, 0.070, min(0.105, 0.230 - bowl)),
-        foot=drawn(rng, 0.062, 0.074),
-        thickness=drawn(rng, 0.0074, 0.0095),
-        wall=drawn(rng, 0.0018, 0.0022),
+        stem=uniform(rng, 0.070, min(0.105, 0.230 - bowl)),
+        foot=uniform(rng, 0.062, 0.074),
+        thickness=uniform(rng, 0.0074, 0.0095),
+        wall=uniform(rng, 0.0018, 0.0022),
         glass=glass,
         tint=tint,
     )

@@ -1,0 +1,1 @@
+"""Generators of tools, one module for each category."""

@@ -16,10 +16,17 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
 from manipose_mj.poses import SymmetryGroup
 
 WOOD, FERRULE, BRISTLES = 620.0, 1800.0, 600.0  # [kg/m^3]; bristles are packed, ferrules hollow
@@ -126,9 +133,7 @@ def design(index: int) -> Brush:
         return Brush()
     rng = specimen_rng("brush", index)
     style = _STYLES[mixed(index) % len(_STYLES)]
-    length, width, thick, ferrule, bristle = (
-        round(float(rng.uniform(*r)), 4) for r in _SIZES[style]
-    )
+    length, width, thick, ferrule, bristle = (uniform(rng, *r) for r in _SIZES[style])
     if style == "artist":
         broad = deep = rng.uniform(0.0104, 0.0122)
     else:

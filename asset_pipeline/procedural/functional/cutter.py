@@ -16,11 +16,11 @@ import numpy as np
 import shapely
 
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, loop_hulls, superellipse
 
 STEEL = 7800.0  # [kg/m^3]
 SHELL = 1500.0  # two shells of plastic or zinc about a channel, on average [kg/m^3]
@@ -71,10 +71,10 @@ def design(index: int) -> Cutter:
     body, accent = in_turn(index, _COLOURS)
     return Cutter(
         "snap" if snap else "trapezoid",
-        grip=round(float(rng.uniform(0.098, 0.118)), 4),
+        grip=uniform(rng, 0.098, 0.118),
         half=round(float(half), 4),
         thick=round(float(half * rng.uniform(0.58, 0.68)), 4),
-        guard=round(float(rng.uniform(0.0055, 0.0070)), 4),
+        guard=uniform(rng, 0.0055, 0.0070),
         nose=round(float(rng.uniform(0.014, 0.019) if snap else rng.uniform(0.020, 0.026)), 4),
         blade=round(float(rng.uniform(0.020, 0.045) if snap else rng.uniform(0.012, 0.020)), 4),
         broad=round(float(half * rng.uniform(1.35, 1.50)), 4),

@@ -16,12 +16,12 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, solid_piece
 from asset_pipeline.procedural.revolution import convex_part, fillet
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, loop_hulls, superellipse
 
 PLASTIC, RUBBER = 1020.0, 1150.0  # [kg/m^3]
 HOLLOW = 520.0  # a handle's plastic and the air in it, on average [kg/m^3]
@@ -70,16 +70,16 @@ def design(index: int) -> Dustpan:
     rng = specimen_rng("dustpan", index)
     tray, accent = in_turn(index, _COLOURS)
     return Dustpan(
-        width=round(float(rng.uniform(0.185, 0.235)), 4),
-        taper=round(float(rng.uniform(0.0, 0.050)), 4),
-        depth=round(float(rng.uniform(0.130, 0.180)), 4),
-        drop=round(float(rng.uniform(0.033, 0.047)), 4),
-        top=round(float(rng.uniform(0.012, 0.015)), 4),
-        low=round(float(rng.uniform(0.005, 0.020)), 4),
-        corner=round(float(rng.uniform(0.014, 0.042)), 4),
-        wall=round(float(rng.uniform(0.0022, 0.0026)), 4),
-        grip=round(float(rng.uniform(0.105, 0.145)), 4),
-        thick=round(float(rng.uniform(0.022, 0.028)), 4),
+        width=uniform(rng, 0.185, 0.235),
+        taper=uniform(rng, 0.0, 0.050),
+        depth=uniform(rng, 0.130, 0.180),
+        drop=uniform(rng, 0.033, 0.047),
+        top=uniform(rng, 0.012, 0.015),
+        low=uniform(rng, 0.005, 0.020),
+        corner=uniform(rng, 0.014, 0.042),
+        wall=uniform(rng, 0.0022, 0.0026),
+        grip=uniform(rng, 0.105, 0.145),
+        thick=uniform(rng, 0.022, 0.028),
         tray=tray,
         accent=accent,
     )

@@ -9,28 +9,27 @@ Palm and tines hang below the handle's axis, so the label's Y points up, out of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from asset_pipeline.procedural.cutlery import (
     BLACK_STEEL,
     BRASS,
-    PLASTIC,
     STEEL,
     STEEL_GREY,
     FlatHandle,
     across,
     dip,
-    drawn_handle,
     flat_handle,
-    moulded_handle,
+    in_plastic,
+    sample_handle,
     side_profile,
     spread,
 )
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.sheet import sheet
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.tool import tool_specimen
 
 PALM = across(9)  # places across palm and tine
@@ -81,10 +80,10 @@ def design(index: int) -> Fork:
         return Fork()
     rng = specimen_rng("fork", index)
     *ranges, tines = _SIZES[index % len(_SIZES)]
-    whole, palm, tine, width = (round(float(rng.uniform(*r)), 4) for r in ranges)
+    whole, palm, tine, width = (uniform(rng, *r) for r in ranges)
     scale = whole / 0.20
     slim = index % 3 == 1  # modern: hardly wider at its end
-    handle = drawn_handle(
+    handle = sample_handle(
         rng,
         length=round(whole - palm - tine, 4),
         end=round(
@@ -106,9 +105,7 @@ def design(index: int) -> Fork:
         rgba=in_turn(index, _METALS),
     )
     if index % 7 == 5:
-        colour = in_turn(index // 7 + 1, _PLASTICS)
-        handle = moulded_handle(handle)
-        return replace(fork, handle=handle, wall=0.0026, density=PLASTIC, rgba=colour)
+        return in_plastic(fork, in_turn(index // 7 + 1, _PLASTICS))
     return fork
 
 

@@ -15,11 +15,18 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.procedural.handles import ROUND, handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import ROUND, handle, loop_hulls, superellipse
 from manipose_mj.poses import SymmetryGroup, compose
 
 STEEL, WOOD, RUBBER, FIBRE = 7850.0, 720.0, 1150.0, 1500.0  # [kg/m^3]
@@ -80,11 +87,11 @@ def design(index: int) -> Hammer:
     return Hammer(
         style,
         grip,
-        length=round(float(rng.uniform(0.232, 0.295)), 4),
-        thick=round(float(rng.uniform(0.029, 0.035)), 4),
+        length=uniform(rng, 0.232, 0.295),
+        thick=uniform(rng, 0.029, 0.035),
         scale=round(float(rng.uniform(0.82, 1.05)), 3),
-        reach=round(float(rng.uniform(0.042, 0.055)), 4),
-        bulk=round(float(rng.uniform(0.050, 0.062)), 4),
+        reach=uniform(rng, 0.042, 0.055),
+        bulk=uniform(rng, 0.050, 0.062),
         hold=hold,
         shaft=shaft,
         head={

@@ -15,11 +15,18 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from asset_pipeline.procedural.handles import handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, loop_hulls, superellipse
 from manipose_mj.poses import compose
 
 STEEL, WOOD, PLASTIC = 7800.0, 850.0, 1250.0  # [kg/m^3]
@@ -122,10 +129,7 @@ def design(index: int) -> Knife:
     plain = style == "table"
     return Knife(
         style,
-        *(
-            round(float(rng.uniform(*r)), 4)
-            for r in (kind.handle, kind.half, kind.blade, kind.high)
-        ),
+        *(uniform(rng, *r) for r in (kind.handle, kind.half, kind.blade, kind.high)),
         bolster=0.0 if plain else round(float(rng.choice((0.0, 0.010, 0.014))), 3),
         rivets=0 if plain else int(rng.choice((0, 2, 3), p=(0.3, 0.2, 0.5))),
         scales=BOLSTER if plain else scales,

@@ -15,10 +15,17 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.procedural.handles import handle
 from asset_pipeline.procedural.pieces import Piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle
 from manipose_mj.poses import SymmetryGroup
 
 WHITE: Colour = (0.94, 0.94, 0.93, 1.0)
@@ -77,7 +84,7 @@ def design(index: int) -> Marker:
         return Marker()
     rng = specimen_rng("marker", index)
     style = _STYLES[mixed(index) % len(_STYLES)]
-    thick, barrel, holder, nib = (round(float(rng.uniform(*r)), 4) for r in _SIZES[style])
+    thick, barrel, holder, nib = (uniform(rng, *r) for r in _SIZES[style])
     turn = 1 + index // len(_STYLES)
     return Marker(
         style,
@@ -87,7 +94,7 @@ def design(index: int) -> Marker:
         step=round(float(rng.uniform(0.58, 0.68)), 3),
         nib=nib,
         taper=round(float(rng.uniform(0.0, 0.05)), 3),
-        plug=round(float(rng.uniform(0.005, 0.014)), 4),
+        plug=uniform(rng, 0.005, 0.014),
         ink=in_turn(turn, _BRIGHT if style == "highlighter" else _INKS),
     )
 

@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
 from asset_pipeline.procedural.vessel import Glaze, bent_wall, disc, rings, vessel
 from manipose_mj.poses import compose
 
@@ -86,9 +86,9 @@ def design(index: int) -> Pan:
         depth=round(float(diameter * rng.uniform(*depth)), 4),
         foot=round(float(diameter * rng.uniform(*foot)), 4),
         bend=bend,
-        wall=round(float(rng.uniform(0.0027, 0.0031)), 4),
-        grip=round(float(rng.uniform(0.132, 0.165)), 4),
-        wide=round(float(rng.uniform(0.022, 0.027)), 4),
+        wall=uniform(rng, 0.0027, 0.0031),
+        grip=uniform(rng, 0.132, 0.165),
+        wide=uniform(rng, 0.022, 0.027),
         outside=outside,
         inside=inside,
         handle=colour,

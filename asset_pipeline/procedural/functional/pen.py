@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.procedural.handles import handle
 from asset_pipeline.procedural.pieces import Piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle
 
 METAL: Colour = (0.78, 0.79, 0.81, 1.0)
 GOLD: Colour = (0.84, 0.70, 0.40, 1.0)
@@ -75,12 +75,12 @@ def design(index: int) -> Pen:
     button = BUTTON if style == "click" else 0.0
     return Pen(
         style,
-        thick=round(float(rng.uniform(0.0098, 0.0112)), 4),
+        thick=uniform(rng, 0.0098, 0.0112),
         barrel=round(float(rng.uniform(0.137, 0.148) - cone - button), 4),
         cone=round(float(cone), 4),
-        clip=round(float(rng.uniform(0.043, 0.049)), 4),
-        off=round(float(rng.uniform(0.0048, 0.0055)), 4),
-        wide=round(float(rng.uniform(0.0060, 0.0074)), 4),
+        clip=uniform(rng, 0.043, 0.049),
+        off=uniform(rng, 0.0048, 0.0055),
+        wide=uniform(rng, 0.0060, 0.0074),
         rubber=round(float(rng.uniform(0.26, 0.48)), 3),
         body=body,
         front=front,

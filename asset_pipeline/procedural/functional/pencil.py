@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import handle
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import loft
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 CEDAR = 520.0  # [kg/m^3], with its lead

@@ -17,14 +17,14 @@ import numpy as np
 import shapely
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
 from asset_pipeline.procedural.solids import box, rounded_box
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose
 
 CHROME: Colour = (0.78, 0.79, 0.81, 1.0)
@@ -98,7 +98,7 @@ def design(index: int) -> Razor:
         return Razor()
     rng = specimen_rng("razor", index)
     style = _STYLES[index % len(_STYLES)]
-    grip, thick, width, length = (round(float(rng.uniform(*r)), 4) for r in _SIZES[style])
+    grip, thick, width, length = (uniform(rng, *r) for r in _SIZES[style])
     body, inlay, head = in_turn(1 + index // len(_STYLES), _COLOURS[style])
     steep = style == "safety"  # its head stands nearly square on the handle
     return Razor(

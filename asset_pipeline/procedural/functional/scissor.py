@@ -19,12 +19,12 @@ from jaxtyping import Float
 from shapely import affinity
 
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
 from asset_pipeline.procedural.solids import loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar_loops
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, loop_hulls, superellipse
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 STEEL, PLASTIC = 7800.0, 1250.0  # [kg/m^3]
@@ -98,7 +98,7 @@ def design(index: int) -> Scissor:
     return Scissor(
         blade=round(float(size * rng.uniform(0.085, 0.105)), 4),
         broad=round(float(size * rng.uniform(0.0165, 0.0195)), 4),
-        sheet=round(float(rng.uniform(0.0015, 0.0020)), 4),
+        sheet=uniform(rng, 0.0015, 0.0020),
         thumb=small,
         fingers=small if alike else large,
         bar=round(float(hand * rng.uniform(0.0075, 0.0095) * (0.8 if metal else 1.0)), 4),

@@ -15,11 +15,11 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.procedural.handles import ROUND, handle, lobed, loop_hulls, superellipse
 from asset_pipeline.procedural.pieces import Piece, solid_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import loft_outwards
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import ROUND, handle, lobed, loop_hulls, superellipse
 from manipose_mj.poses import SymmetryGroup
 
 STEEL, PLASTIC, WOOD = 7850.0, 1200.0, 700.0  # [kg/m^3]
@@ -97,7 +97,7 @@ def design(index: int) -> Screwdriver:
         style,
         grip=round(float(grip), 4),
         thick=round(float(grip * rng.uniform(0.29, 0.33)), 4),
-        shank=round(float(rng.uniform(0.072, 0.172)), 4),
+        shank=uniform(rng, 0.072, 0.172),
         wire=round(float(wire), 4),
         tip=tip,
         width=round(float(wire * rng.uniform(1.2, 1.45)), 4),

@@ -18,10 +18,10 @@ import shapely
 from shapely import affinity
 
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 STEEL = 7850.0  # [kg/m^3]

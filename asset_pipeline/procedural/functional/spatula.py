@@ -18,14 +18,14 @@ import shapely
 import shapely.affinity
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
 from asset_pipeline.procedural.revolution import halves
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose
 
 STEEL, NYLON, PLASTIC, WOOD = 7850.0, 1150.0, 900.0, 680.0  # [kg/m^3]; plastic handles are hollow
@@ -100,13 +100,13 @@ def design(index: int) -> Spatula:
     nylon = style == "nylon"
     return Spatula(
         style,
-        grip=round(float(rng.uniform(0.104, 0.132)), 4),
-        wide=round(float(rng.uniform(0.0190, 0.0250)), 4),
-        deep=round(float(rng.uniform(0.0140, 0.0180)), 4),
-        stem=round(float(rng.uniform(0.072, 0.105)), 4),
+        grip=uniform(rng, 0.104, 0.132),
+        wide=uniform(rng, 0.0190, 0.0250),
+        deep=uniform(rng, 0.0140, 0.0180),
+        stem=uniform(rng, 0.072, 0.105),
         rod=round(float(rng.uniform(0.0100, 0.0125) if nylon else rng.uniform(0.0070, 0.0095)), 4),
-        drop=round(float(rng.uniform(0.022, 0.032)), 4),
-        length=round(float(rng.uniform(0.085, 0.110)), 4),
+        drop=uniform(rng, 0.022, 0.032),
+        length=uniform(rng, 0.085, 0.110),
         front=round(float(front), 4),
         back=round(float(front * rng.uniform(0.62, 0.95)), 4),
         wall=round(float(rng.uniform(0.0026, 0.0034) if nylon else rng.uniform(0.0020, 0.0023)), 4),

@@ -10,28 +10,34 @@ The bowl hangs below the handle's axis, so the label's Y points up, out of its m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from asset_pipeline.procedural.cutlery import (
     BLACK_STEEL,
     BRASS,
-    PLASTIC,
     STEEL,
     STEEL_GREY,
     FlatHandle,
     across,
     dip,
-    drawn_handle,
     flat_handle,
-    moulded_handle,
+    in_plastic,
+    sample_handle,
     side_profile,
     spread,
 )
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.sheet import sheet
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
+from asset_pipeline.procedural.specimen import (
+    Colour,
+    Specimen,
+    in_turn,
+    mixed,
+    specimen_rng,
+    uniform,
+)
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.tool import tool_specimen
 
@@ -88,11 +94,9 @@ def design(index: int) -> Spoon:
     rng = specimen_rng("spoon", index)
     if mixed(index) % 5 == 3:
         return _cooking_spoon(rng, in_turn(index // 5 + 1, _WOODS))
-    whole, bowl, width, end, neck = (
-        round(float(rng.uniform(*r)), 4) for r in _SIZES[index % len(_SIZES)]
-    )
+    whole, bowl, width, end, neck = (uniform(rng, *r) for r in _SIZES[index % len(_SIZES)])
     slim = index % 3 == 2  # modern: hardly wider at its end
-    handle = drawn_handle(
+    handle = sample_handle(
         rng,
         length=round(whole - bowl, 4),
         end=round(0.72 * end, 4) if slim else end,
@@ -108,9 +112,7 @@ def design(index: int) -> Spoon:
         rgba=in_turn(index, _METALS),
     )
     if index % 8 == 6:
-        colour = in_turn(index // 8 + 1, _PLASTICS)
-        handle = moulded_handle(handle)
-        return replace(spoon, handle=handle, wall=0.0026, density=PLASTIC, rgba=colour)
+        return in_plastic(spoon, in_turn(index // 8 + 1, _PLASTICS))
     return spoon
 
 
@@ -124,9 +126,9 @@ def _cooking_spoon(rng: np.random.Generator, wood: Colour) -> Spoon:
             thick=round(float(thick), 4),
         ),
         bowl=round(float(bowl), 4),
-        width=round(float(rng.uniform(0.046, 0.058)), 4),
-        depth=round(float(rng.uniform(0.007, 0.009)), 4),
-        wall=round(float(rng.uniform(0.0055, 0.007)), 4),
+        width=uniform(rng, 0.046, 0.058),
+        depth=uniform(rng, 0.007, 0.009),
+        wall=uniform(rng, 0.0055, 0.007),
         slope=round(float(rng.uniform(0.16, 0.22)), 3),
         wooden=True,
         density=BEECH,

@@ -16,10 +16,10 @@ import numpy as np
 import shapely
 
 from asset_pipeline.procedural.extruded import panel
-from asset_pipeline.procedural.handles import handle, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
 from manipose_mj.poses import SymmetryGroup, compose
 
 METAL, PLASTIC, RUBBER = 2700.0, 1150.0, 1150.0  # [kg/m^3]
@@ -74,8 +74,8 @@ def design(index: int) -> Squeegee:
     return Squeegee(
         style,
         width=round(float(width), 4),
-        grip=round(float(rng.uniform(0.115, 0.150)), 4),
-        thick=round(float(rng.uniform(0.025, 0.031)), 4),
+        grip=uniform(rng, 0.115, 0.150),
+        thick=uniform(rng, 0.025, 0.031),
         clamp=round(
             float(
                 width * rng.uniform(0.22, 0.32) if style == "yoke" else rng.uniform(0.026, 0.036)
@@ -85,8 +85,8 @@ def design(index: int) -> Squeegee:
         deep=round(
             float(rng.uniform(0.026, 0.038) if style == "yoke" else rng.uniform(0.016, 0.022)), 4
         ),
-        channel=round(float(rng.uniform(0.0052, 0.0068)), 4),
-        rubber=round(float(rng.uniform(0.010, 0.015)), 4),
+        channel=uniform(rng, 0.0052, 0.0068),
+        rubber=uniform(rng, 0.010, 0.015),
         handle=colour,
         holder=holder,
         rail=rail,

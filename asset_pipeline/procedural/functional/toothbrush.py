@@ -16,13 +16,13 @@ from typing import cast
 import numpy as np
 import trimesh
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import shape_mass_properties
-from asset_pipeline.procedural.handles import handle, superellipse
+from asset_pipeline.geometry.mass import shape_mass_properties
 from asset_pipeline.procedural.pieces import Piece
 from asset_pipeline.procedural.solids import box
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.tool import tool_specimen
+from asset_pipeline.procedural.tool_handles import handle, superellipse
+from manipose_mj.assets.geometry import Shape
 
 PLASTIC, BAMBOO, BRISTLES = 1050.0, 700.0, 480.0  # [kg/m^3]
 THIN = 0.0024  # half the head's thickness [m]
@@ -94,12 +94,12 @@ def design(index: int) -> Toothbrush:
         ),
         swell=0.0 if bamboo else round(float(rng.uniform(0.0, 0.2)), 3),
         neck=round(float(rng.uniform(0.040, 0.044) if child else rng.uniform(0.042, 0.050)), 4),
-        slim=round(float(rng.uniform(0.0050, 0.0060)), 4),
+        slim=uniform(rng, 0.0050, 0.0060),
         head=round(0.0031 * columns + 0.0025, 4),
         broad=round(float(broad), 4),
         rows=rows,
         columns=columns,
-        bristle=round(float(rng.uniform(0.0104, 0.0124)), 4),
+        bristle=uniform(rng, 0.0104, 0.0124),
         inlays=1 + index % 2,
         bamboo=bamboo,
         body=WOOD if bamboo else body,

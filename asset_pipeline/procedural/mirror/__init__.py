@@ -1,0 +1,1 @@
+"""Generators of mirror-symmetric objects, one module for each category."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.procedural.handles import ALONG_X, ALONG_Y, superellipse
 from asset_pipeline.procedural.pieces import Piece, placed, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, print_on_face
 from asset_pipeline.procedural.specimen import Colour
 from asset_pipeline.procedural.swept import loft_outwards
+from asset_pipeline.procedural.tool_handles import ALONG_X, ALONG_Y, superellipse
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose, rotation_about
 
 RUBBER: Colour = (0.11, 0.11, 0.12, 1.0)
@@ -108,7 +108,7 @@ def nacelle(at: Float[np.ndarray, "3"], girth: float, *, rgba: Colour, density: 
     engine = turned(profile, levels, bands=bands, density=density, sections=28)
     face = compose(np.eye(3), np.array([0.0, 0.0, half]))
     hole = print_on_face(ellipse((0.7 * r, 0.7 * r), 24), face, 3)
-    looks = (*engine.visual, Shape("mesh", mesh=hole, rgba=RUBBER))
+    visuals = (*engine.visual, Shape("mesh", mesh=hole, rgba=RUBBER))
     return placed(
-        Piece(looks, engine.collision, engine.mass), compose(ALONG_X[:3, :3], np.asarray(at))
+        Piece(visuals, engine.collision, engine.mass), compose(ALONG_X[:3, :3], np.asarray(at))
     )

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Body, Shape
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import combine, shape_mass_properties
+from asset_pipeline.geometry.mass import combine, shape_mass_properties
 from asset_pipeline.procedural.solids import (
     ellipse,
     print_on_face,
     rounded_box_bands,
     rounded_rectangle,
 )
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Body, Shape
+from manipose_mj.assets.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 CARDBOARD = 700.0  # [kg/m^3]
@@ -73,7 +73,7 @@ def design(index: int) -> Carton:
         return Carton()
     rng = specimen_rng("box", index)
     depth, width, height, content = _KINDS[index % len(_KINDS)]
-    d, w, h = (round(float(rng.uniform(*r)), 4) for r in (depth, width, height))
+    d, w, h = (uniform(rng, *r) for r in (depth, width, height))
     if depth == width:
         w = d
     body, band, ink = in_turn(index, _PRINTS)
@@ -88,7 +88,7 @@ def generate(index: int = 0) -> Specimen:
     body = Body(
         name="box",
         collision=(Shape("box", tuple(half)),),
-        visual=_looks(carton, square),
+        visual=_visuals(carton, square),
         mass_properties=combine(
             [
                 shape_mass_properties([Shape("box", tuple(half))], CARDBOARD),
@@ -120,7 +120,7 @@ def _content(half: np.ndarray, density: float):
     return type(solid)(sign * solid.mass, solid.center_of_mass, sign * solid.inertia)
 
 
-def _looks(carton: Carton, square: bool) -> tuple[Shape, ...]:
+def _visuals(carton: Carton, square: bool) -> tuple[Shape, ...]:
     """Body, bands and a printed panel on every side; the print is as symmetric as the box."""
     x, y, z = carton.depth / 2, carton.width / 2, carton.height / 2
     inner, outer = 0.72 * z, 0.84 * z

@@ -14,9 +14,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import ALONG_X
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import (
@@ -28,7 +26,9 @@ from asset_pipeline.procedural.solids import (
     rounded_rectangle,
 )
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.tool_handles import ALONG_X
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose
 
 LENS_SHARE = 0.5  # of the body's density: tubes with air between the glasses
@@ -70,7 +70,7 @@ class Camera:
 
 
 # Covering, plates, lens.
-_LOOKS: tuple[tuple[Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour], ...] = (
     ((0.15, 0.14, 0.14, 1.0), SILVER, SILVER),
     ((0.45, 0.26, 0.15, 1.0), SILVER, SILVER),
     ((0.66, 0.12, 0.13, 1.0), (0.66, 0.12, 0.13, 1.0), SILVER),
@@ -104,7 +104,7 @@ def design(index: int) -> Camera:
         ),
     }[style]
     sizes = [round(float(value), 4) for value in rng.uniform(low, high)]
-    covering, plates, barrel = in_turn(index, _LOOKS)
+    covering, plates, barrel = in_turn(index, _COLOURS)
     return Camera(style, *sizes, covering=covering, plates=plates, barrel=barrel)
 
 
@@ -131,21 +131,21 @@ def _body(camera: Camera) -> Piece:
     low, high = -0.62 * half[2], 0.52 * half[2]
     bands = rounded_box_bands((half[0], half[1], half[2]), camera.edge, (low, high))
     colours = (camera.plates, camera.covering, camera.plates)
-    looks = [Shape("mesh", mesh=m, rgba=c) for m, c in zip(bands, colours, strict=True)]
+    visuals = [Shape("mesh", mesh=m, rgba=c) for m, c in zip(bands, colours, strict=True)]
     (closed,) = rounded_box_bands((half[0], half[1], half[2]), camera.edge)
     screen = compose(BACK[:3, :3], np.array([-half[0], 0.0, -0.12 * half[2]]))
-    looks += [
+    visuals += [
         _print(rounded_rectangle((0.52 * half[1], 0.62 * half[2]), 0.003), screen, BLACK),
         _print(rounded_rectangle((0.47 * half[1], 0.54 * half[2]), 0.001), screen, GLASS, 2),
     ]
     window_z = 0.74 * half[2]
     for side in (-1.0, 1.0):  # viewfinder and flash windows
         at = compose(FRONT[:3, :3], np.array([half[0], 0.62 * side * half[1], window_z]))
-        looks.append(
+        visuals.append(
             _print(rounded_rectangle((0.009, 0.16 * half[2]), 0.001), at, (0.72, 0.74, 0.74, 1.0))
         )
     mass = solid_mass_properties(closed, camera.density * float(closed.volume))
-    return Piece(tuple(looks), (_chamfered(half, camera.edge),), mass)
+    return Piece(tuple(visuals), (_chamfered(half, camera.edge),), mass)
 
 
 def _print(outline: np.ndarray, pose: np.ndarray, rgba: Colour, layer: int = 1) -> Shape:

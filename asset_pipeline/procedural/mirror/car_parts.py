@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.procedural.handles import ALONG_Y
 from asset_pipeline.procedural.pieces import Piece, placed
 from asset_pipeline.procedural.solids import ellipse, print_on_face, rounded_rectangle
 from asset_pipeline.procedural.specimen import Colour
+from asset_pipeline.procedural.tool_handles import ALONG_Y
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import compose, rotation_about
 
 GLASS: Colour = (0.14, 0.18, 0.24, 1.0)

@@ -13,9 +13,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.dial import dial_prints
-from asset_pipeline.procedural.handles import ALONG_X
 from asset_pipeline.procedural.moulded import (
     ON_EDGE,
     facing,
@@ -27,9 +25,11 @@ from asset_pipeline.procedural.moulded import (
 )
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.solids import ellipse
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
+from asset_pipeline.procedural.tool_handles import ALONG_X
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 INK: Colour = (0.10, 0.10, 0.11, 1.0)
@@ -68,7 +68,7 @@ class Clock:
 _WHITE: Colour = (0.96, 0.96, 0.95, 1.0)
 _BLACK: Colour = (0.14, 0.14, 0.15, 1.0)
 # Case, dial, rim, marks.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     (_BLACK, _WHITE, (0.30, 0.30, 0.32, 1.0), INK),
     ((0.40, 0.62, 0.60, 1.0), (0.97, 0.95, 0.88, 1.0), BRASS, INK),
     ((0.56, 0.36, 0.20, 1.0), (0.95, 0.92, 0.82, 1.0), BRASS, (0.30, 0.16, 0.08, 1.0)),
@@ -87,21 +87,21 @@ def design(index: int) -> Clock:
     rng = specimen_rng("clock", index)
     style: Style = in_turn(index, _STYLES)
     low, high = {"bells": (0.074, 0.096), "foot": (0.072, 0.104), "block": (0.072, 0.112)}[style]
-    width = drawn(rng, low, high)
+    width = uniform(rng, low, high)
     height = round(width * float(rng.uniform(0.72, 0.95)), 4) if style == "block" else width
     return Clock(
         style,
         width,
         height,
-        depth=drawn(rng, 0.032, 0.042) if style != "block" else drawn(rng, 0.038, 0.052),
-        lift=drawn(rng, 0.012, 0.018) if style == "bells" else drawn(rng, 0.007, 0.011),
+        depth=uniform(rng, 0.032, 0.042) if style != "block" else uniform(rng, 0.038, 0.052),
+        lift=uniform(rng, 0.012, 0.018) if style == "bells" else uniform(rng, 0.007, 0.011),
         bell=round(width * float(rng.uniform(0.20, 0.25)), 4),
-        back=drawn(rng, 0.018, 0.026) if style != "block" else drawn(rng, 0.006, 0.008),
-        narrow=drawn(rng, 0.62, 0.76),
+        back=uniform(rng, 0.018, 0.026) if style != "block" else uniform(rng, 0.006, 0.008),
+        narrow=uniform(rng, 0.62, 0.76),
         hour=int(rng.integers(1, 13)),
         minute=int(rng.integers(0, 60)),
         density=round(float(rng.uniform(520.0, 760.0)), 0),
-        **dict(zip(("case", "dial", "rim", "marks"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("case", "dial", "rim", "marks"), in_turn(index, _COLOURS), strict=True)),
     )
 
 

@@ -14,15 +14,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import ALONG_Y, loop_hulls
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.moulded import facing, printed, rectangle, rounded_polygon
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.shell import painted
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar, loft_outwards
+from asset_pipeline.procedural.tool_handles import ALONG_Y, loop_hulls
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose
 
 RUBBER: Colour = (0.12, 0.12, 0.13, 1.0)
@@ -66,7 +66,7 @@ _WHITE: Colour = (0.93, 0.93, 0.93, 1.0)
 _BLACK: Colour = (0.14, 0.14, 0.15, 1.0)
 _SILVER: Colour = (0.72, 0.73, 0.75, 1.0)
 # Shell, buttons, sides, wheel.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     (_WHITE, (0.98, 0.98, 0.98, 1.0), (0.62, 0.64, 0.67, 1.0), (0.30, 0.31, 0.33, 1.0)),
     ((0.20, 0.36, 0.60, 1.0), _BLACK, _BLACK, (0.20, 0.36, 0.60, 1.0)),
     (_SILVER, _SILVER, _BLACK, _BLACK),
@@ -87,21 +87,21 @@ def design(index: int) -> Mouse:
     if index == 0:
         return Mouse()
     rng = specimen_rng("computer_mouse", index)
-    length = drawn(rng, 0.096, 0.112)
+    length = uniform(rng, 0.096, 0.112)
     return Mouse(
         length,
-        drawn(rng, 0.056, 0.066),
-        drawn(rng, 0.035, 0.042),
-        front=drawn(rng, 0.40, 0.50),
-        peak=drawn(rng, 0.28, 0.38),
-        waist=drawn(rng, 0.88, 0.97),
-        nose=drawn(rng, 0.80, 0.90),
-        round_off=drawn(rng, 0.24, 0.34),
-        square=drawn(rng, 2.4, 3.2),
-        split=drawn(rng, 0.42, 0.54),
-        cord=drawn(rng, 0.0165, 0.020),
+        uniform(rng, 0.056, 0.066),
+        uniform(rng, 0.035, 0.042),
+        front=uniform(rng, 0.40, 0.50),
+        peak=uniform(rng, 0.28, 0.38),
+        waist=uniform(rng, 0.88, 0.97),
+        nose=uniform(rng, 0.80, 0.90),
+        round_off=uniform(rng, 0.24, 0.34),
+        square=uniform(rng, 2.4, 3.2),
+        split=uniform(rng, 0.42, 0.54),
+        cord=uniform(rng, 0.0165, 0.020),
         density=round(float(rng.uniform(520.0, 760.0)), 0),
-        **dict(zip(("shell", "buttons", "sides", "wheel"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("shell", "buttons", "sides", "wheel"), in_turn(index, _COLOURS), strict=True)),
     )
 
 
@@ -161,13 +161,13 @@ def _shell(mouse: Mouse) -> Piece:
     column = (np.asarray(mesh.faces) % POINTS + POINTS // 2) % POINTS - POINTS // 2
     low = np.abs(column).max(axis=1) > BELT
     front = mesh.triangles_center[:, 0] > mouse.length * (0.5 - mouse.split)
-    looks = []
+    visuals = []
     for mask, rgba in (
         (low, mouse.sides),
         (~low & front, mouse.buttons),
         (~low & ~front, mouse.shell),
     ):
-        looks.append(painted(mesh, mask, rgba, rgba)[0])
+        visuals.append(painted(mesh, mask, rgba, rgba)[0])
     feet = [
         printed(
             rounded_polygon(rectangle(0.30 * mouse.width, 0.004), 0.003),
@@ -177,7 +177,7 @@ def _shell(mouse: Mouse) -> Piece:
         for x in (-0.26, 0.32)
     ]
     mass = solid_mass_properties(mesh, mouse.density * float(mesh.volume))
-    return Piece((*looks, *feet, *_gaps(mouse, loops)), loop_hulls(loops), mass)
+    return Piece((*visuals, *feet, *_gaps(mouse, loops)), loop_hulls(loops), mass)
 
 
 def _gaps(mouse: Mouse, loops: np.ndarray) -> list[Shape]:

@@ -20,7 +20,7 @@ from asset_pipeline.procedural.moulded import (
     slab_loops,
 )
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from manipose_mj.poses import SymmetryGroup
 
 CLIP = 0.0026  # thickness of a clip [m]
@@ -54,7 +54,7 @@ class Container:
 
 _CLEAR: Colour = (0.86, 0.89, 0.90, 1.0)
 # Box, lid, clips.
-_LOOKS: tuple[tuple[Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour], ...] = (
     (_CLEAR, (0.86, 0.30, 0.24, 1.0), (0.78, 0.24, 0.19, 1.0)),
     (_CLEAR, (0.55, 0.74, 0.30, 1.0), (0.47, 0.66, 0.24, 1.0)),
     ((0.92, 0.90, 0.86, 1.0), (0.30, 0.31, 0.33, 1.0), (0.40, 0.41, 0.43, 1.0)),
@@ -70,22 +70,22 @@ def design(index: int) -> Container:
     if index == 0:
         return Container()
     rng = specimen_rng("container", index)
-    width = drawn(rng, 0.072, 0.125)
+    width = uniform(rng, 0.072, 0.125)
     length = round(min(width * float(rng.uniform(1.25, 1.9)), 0.20), 4)
-    height = drawn(rng, 0.042, 0.066)
+    height = uniform(rng, 0.042, 0.066)
     mass = length * width * height * float(rng.uniform(200.0, 330.0)) + 0.03
     return Container(
         length,
         width,
         height,
-        lid=drawn(rng, 0.009, 0.013),
-        overhang=drawn(rng, 0.004, 0.007),
-        taper=drawn(rng, 0.003, 0.008),
-        corner=drawn(rng, 0.012, 0.028),
+        lid=uniform(rng, 0.009, 0.013),
+        overhang=uniform(rng, 0.004, 0.007),
+        taper=uniform(rng, 0.003, 0.008),
+        corner=uniform(rng, 0.012, 0.028),
         clips=4 if index % 3 else 2,
-        clip=drawn(rng, 0.34, 0.56),
+        clip=uniform(rng, 0.34, 0.56),
         density=round(mass / (0.86 * length * width * height), 0),
-        **dict(zip(("body", "top", "latch"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("body", "top", "latch"), in_turn(index, _COLOURS), strict=True)),
     )
 
 

@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.moulded import (
     facing,
     moulded,
@@ -25,9 +24,10 @@ from asset_pipeline.procedural.moulded import (
 )
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.solids import box, ellipse, rounded_box
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 WHITE: Colour = (0.96, 0.96, 0.95, 1.0)
@@ -64,7 +64,7 @@ class DrinkBox:
 
 
 # Carton, band, print, straw or cap.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     (WHITE, (0.22, 0.48, 0.78, 1.0), (0.14, 0.30, 0.58, 1.0), (0.16, 0.36, 0.66, 1.0)),
     ((0.72, 0.12, 0.20, 1.0), (0.95, 0.80, 0.78, 1.0), (0.94, 0.90, 0.84, 1.0), WHITE),
     (
@@ -102,32 +102,38 @@ def design(index: int) -> DrinkBox:
         return DrinkBox()
     rng = specimen_rng("drinkbox", index)
     style: Style = in_turn(index, _STYLES)
-    colours = dict(zip(("carton", "band", "ink", "extra"), in_turn(index, _LOOKS), strict=True))
+    colours = dict(zip(("carton", "band", "ink", "extra"), in_turn(index, _COLOURS), strict=True))
     if style == "brick":
-        length = drawn(rng, 0.046, 0.066)
+        length = uniform(rng, 0.046, 0.066)
         volume = float(rng.choice((0.125e-3, 0.2e-3, 0.25e-3)))
         width = round(length * float(rng.uniform(0.62, 0.80)), 4)
         height = round(float(np.clip(volume / (length * width), 0.074, 0.118)), 4)
         radius, out, reach = (
-            drawn(rng, 0.0022, 0.0030),
-            drawn(rng, 0.020, 0.034),
-            drawn(rng, 0.024, 0.030),
+            uniform(rng, 0.0022, 0.0030),
+            uniform(rng, 0.020, 0.034),
+            uniform(rng, 0.024, 0.030),
         )
         return DrinkBox(style, length, width, height, 0.0, 0.0, radius, out, reach, **colours)
     if style == "gable":
-        width = drawn(rng, 0.052, 0.064)
+        width = uniform(rng, 0.052, 0.064)
         length = round(width * float(rng.uniform(1.13, 1.24)), 4)
-        height = drawn(rng, 0.075, 0.165)
-        roof, fin = round(width * float(rng.uniform(0.40, 0.50)), 4), drawn(rng, 0.011, 0.016)
+        height = uniform(rng, 0.075, 0.165)
+        roof, fin = (
+            round(width * float(rng.uniform(0.40, 0.50)), 4),
+            uniform(rng, 0.011, 0.016),
+        )
         density = float(rng.uniform(550.0, 950.0)) * min(1.0, 0.11 / height)
         return DrinkBox(
             style, length, width, height, roof, fin, density=round(density, 0), **colours
         )
-    width = drawn(rng, 0.056, 0.066)
+    width = uniform(rng, 0.056, 0.066)
     length = round(width * float(rng.uniform(1.14, 1.26)), 4)
-    height, roof = drawn(rng, 0.145, 0.195), round(length * float(rng.uniform(0.46, 0.56)), 4)
+    height, roof = (
+        uniform(rng, 0.145, 0.195),
+        round(length * float(rng.uniform(0.46, 0.56)), 4),
+    )
     density = round(float(rng.uniform(400.0, 650.0)), 0)
-    radius, cap = drawn(rng, 0.0145, 0.0175), drawn(rng, 0.016, 0.020)
+    radius, cap = uniform(rng, 0.0145, 0.0175), uniform(rng, 0.016, 0.020)
     return DrinkBox(style, length, width, height, roof, 0.0, radius, cap, 0.0, density, **colours)
 
 

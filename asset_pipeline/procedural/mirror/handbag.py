@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import box, ellipse, loft, print_on_face, rounded_rectangle
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
 EDGE = 0.008  # rounding of the lower and upper edges [m]
@@ -91,11 +91,11 @@ def design(index: int) -> Handbag:
         narrow=narrow,
         thin=thin,
         swell=swell,
-        corner=round(float(rng.uniform(0.012, 0.028)), 4),
+        corner=uniform(rng, 0.012, 0.028),
         handles=1 if index % 3 == 2 else 2,
-        rise=round(float(rng.uniform(0.062, 0.098)), 4),
+        rise=uniform(rng, 0.062, 0.098),
         span=round(float(rng.uniform(0.40, 0.52)), 3),
-        thick=round(float(rng.uniform(0.009, 0.013)), 4),
+        thick=uniform(rng, 0.009, 0.013),
         mass=round(float(0.16 + width * rng.uniform(0.7, 1.3)), 3),
         lower=float(rng.choice((0.0, 0.28, 0.36))),
         colour=colour,
@@ -140,20 +140,22 @@ def _body(bag: Handbag) -> Piece:
         ]
     )
     cut = int(np.searchsorted(z, bag.lower * bag.height)) if bag.lower else 0
-    looks = [Shape("mesh", mesh=loft(rings[cut:], caps=(cut == 0, True)), rgba=bag.colour)]
+    visuals = [Shape("mesh", mesh=loft(rings[cut:], caps=(cut == 0, True)), rgba=bag.colour)]
     if cut:
-        looks.append(Shape("mesh", mesh=loft(rings[: cut + 1], caps=(True, False)), rgba=bag.base))
+        visuals.append(
+            Shape("mesh", mesh=loft(rings[: cut + 1], caps=(True, False)), rgba=bag.base)
+        )
     top = bag.half(np.array(1.0))
     zip_half = (0.80 * top[0], 0.0045)
     lid = compose(np.eye(3), np.array([0.0, 0.0, bag.height]))
-    looks.append(
+    visuals.append(
         Shape("mesh", mesh=print_on_face(rounded_rectangle(zip_half, 0.003), lid), rgba=DARK)
     )
     stops = [0, 3, 5, 3 + (LEVELS - 1) // 2, 9, 2 + LEVELS, len(rings) - 1]
     parts = [_frustum(rings[a], rings[b]) for a, b in zip(stops[:-1], stops[1:], strict=True)]
     mesh = loft(rings)
     return Piece(
-        (*looks, *_plates(bag)), tuple(parts), solid_mass_properties(mesh, 0.88 * bag.mass)
+        (*visuals, *_plates(bag)), tuple(parts), solid_mass_properties(mesh, 0.88 * bag.mass)
     )
 
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.sheet import sheet
 from asset_pipeline.procedural.shell import offset_loops, shell_piece
 from asset_pipeline.procedural.solids import ellipse, loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 POINTS = 48
@@ -85,12 +85,12 @@ def design(index: int) -> Helmet:
         length=round(float(length), 4),
         width=round(float(length * rng.uniform(0.79, 0.86)), 4),
         height=round(float(length * rng.uniform(0.41, 0.47)), 4),
-        foam=round(float(rng.uniform(0.018, 0.026)), 4),
+        foam=uniform(rng, 0.018, 0.026),
         power=round(float(rng.uniform(2.1, 2.6)), 2),
         egg=round(float(rng.uniform(0.05, 0.14)), 3),
-        depth=round(float(rng.uniform(0.014, 0.026)), 4),
-        arch=round(float(rng.uniform(0.003, 0.012)), 4),
-        visor=round(float(rng.uniform(0.034, 0.048)), 4),
+        depth=uniform(rng, 0.014, 0.026),
+        arch=uniform(rng, 0.003, 0.012),
+        visor=uniform(rng, 0.034, 0.048),
         density=round(float(rng.uniform(140.0, 185.0)), 0),
         vents=((2, 3), (3, 3), (1, 2), (2, 2))[index % 4],
         colour=colour,

@@ -13,9 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Body, Shape
-from asset_pipeline.labelling.label import PoseLabel
-from asset_pipeline.mass import combine, solid_mass_properties
+from asset_pipeline.geometry.mass import combine, solid_mass_properties
 from asset_pipeline.procedural.revolution import (
     convex_part,
     fillet,
@@ -24,7 +22,9 @@ from asset_pipeline.procedural.revolution import (
     wall_wedges,
 )
 from asset_pipeline.procedural.solids import loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Body, Shape
+from manipose_mj.assets.label import PoseLabel
 from manipose_mj.poses import SymmetryGroup
 
 STONEWARE = 2300.0  # [kg/m^3]
@@ -58,7 +58,7 @@ class Mug:
     stripe: Colour | None = None
     inside: Colour = WHITE
 
-    def outer_radius(self, z: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    def outer_radius(self, z: float | Float[np.ndarray, "*n"]) -> float | Float[np.ndarray, "*n"]:
         """Radius of the outer wall at height `z` above the bottom."""
         return (self.foot + (self.rim - self.foot) * z / self.height) / 2
 
@@ -87,14 +87,14 @@ def design(index: int) -> Mug:
         foot=round(float(widest - max(taper, 0.0)), 4),
         rim=round(float(widest + min(taper, 0.0)), 4),
         height=round(float(height), 4),
-        wall=round(float(rng.uniform(0.0032, 0.0048)), 4),
-        bottom=round(float(rng.uniform(0.005, 0.006)), 4),
-        corner=round(float(rng.uniform(0.003, 0.006)), 4),
-        reach=round(float(rng.uniform(0.031, 0.038)), 4),
+        wall=uniform(rng, 0.0032, 0.0048),
+        bottom=uniform(rng, 0.005, 0.006),
+        corner=uniform(rng, 0.003, 0.006),
+        reach=uniform(rng, 0.031, 0.038),
         grip=round(float(rng.uniform(0.60, 0.70)), 3),
         square=round(float(rng.uniform(2.1, 3.0)), 2),
-        thick=round(float(rng.uniform(0.0075, 0.0095)), 4),
-        wide=round(float(rng.uniform(0.012, 0.016)), 4),
+        thick=uniform(rng, 0.0075, 0.0095),
+        wide=uniform(rng, 0.012, 0.016),
         glaze=glaze,
         stripe=stripe,
         inside=inside,
@@ -119,7 +119,7 @@ def generate(index: int = 0) -> Specimen:
     body = Body(
         name="mug",
         collision=tuple(_moved(s, -centre) for s in _collision(mug, sections)),
-        visual=tuple(_moved(s, -centre) for s in _looks(mug, section, sections)),
+        visual=tuple(_moved(s, -centre) for s in _visuals(mug, section, sections)),
         mass_properties=type(mass)(mass.mass, mass.center_of_mass - centre, mass.inertia),
     )
     length, width, height = high - low
@@ -205,13 +205,13 @@ def _collision(mug: Mug, sections: np.ndarray) -> list[Shape]:
     return shapes
 
 
-def _looks(mug: Mug, section: tuple[np.ndarray, np.ndarray], sections: np.ndarray) -> list[Shape]:
+def _visuals(mug: Mug, section: tuple[np.ndarray, np.ndarray], sections: np.ndarray) -> list[Shape]:
     outer, inner = section
     low, high = 0.70 * mug.height, 0.86 * mug.height
     if mug.stripe is None:
         bands = [(outer, mug.glaze)]
     else:
-        cut = np.array([[mug.outer_radius(np.array(z)), z] for z in (low, high)])
+        cut = np.array([[mug.outer_radius(z), z] for z in (low, high)])
         below = outer[outer[:, 1] < low]
         above = outer[outer[:, 1] > high]
         bands = [

@@ -15,10 +15,8 @@ from typing import Literal
 import numpy as np
 import trimesh
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import ALONG_Y
-from asset_pipeline.procedural.lying import LONG_Y, OVER, along_face
+from asset_pipeline.geometry.mass import solid_mass_properties
+from asset_pipeline.procedural.flat_objects import LONG_Y, OVER, along_face
 from asset_pipeline.procedural.moulded import (
     facing,
     moulded,
@@ -30,8 +28,10 @@ from asset_pipeline.procedural.moulded import (
 from asset_pipeline.procedural.pieces import UPRIGHT, AreaBox, Piece, placed_shape, rigid_specimen
 from asset_pipeline.procedural.revolution import wall_wedges
 from asset_pipeline.procedural.snap_strap import snap_strap
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar_loops, loft_outwards
+from asset_pipeline.procedural.tool_handles import ALONG_Y
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 PAPER: Colour = (0.95, 0.93, 0.87, 1.0)
@@ -70,7 +70,7 @@ class Notebook:
 _WHITE: Colour = (0.94, 0.94, 0.93, 1.0)
 _BLACK: Colour = (0.14, 0.14, 0.15, 1.0)
 # Cover, band, label, coil or strap.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     (_BLACK, (0.26, 0.26, 0.28, 1.0), (0.86, 0.84, 0.78, 1.0), (0.72, 0.14, 0.14, 1.0)),
     ((0.74, 0.22, 0.20, 1.0), (0.56, 0.14, 0.13, 1.0), _WHITE, _WHITE),
     ((0.72, 0.58, 0.40, 1.0), (0.54, 0.40, 0.25, 1.0), (0.95, 0.92, 0.84, 1.0), _BLACK),
@@ -101,7 +101,7 @@ def design(index: int) -> Notebook:
         "diary": (0.012, 0.018),
         "coil": (0.12 * width, 0.135 * width),
     }[style]
-    thick = drawn(rng, low, high)
+    thick = uniform(rng, low, high)
     coil = round(thick / 2 + float(rng.uniform(0.0006, 0.0010)), 4)
     return Notebook(
         style,
@@ -109,12 +109,12 @@ def design(index: int) -> Notebook:
         depth,
         thick,
         coil=coil,
-        strap=drawn(rng, 0.022, 0.034),
+        strap=uniform(rng, 0.022, 0.034),
         past=round(width * float(rng.uniform(0.132, 0.148)), 4)
         if style == "diary"
         else round(0.42 * coil, 4),
         density=round(float(rng.uniform(650.0, 800.0)), 0),
-        **dict(zip(("cover", "band", "label", "extra"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("cover", "band", "label", "extra"), in_turn(index, _COLOURS), strict=True)),
     )
 
 

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import fillet
 from asset_pipeline.procedural.shell import revolved_loops, shell_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar
 from manipose_mj.poses import SymmetryGroup
 
@@ -57,7 +57,7 @@ class Pitcher:
     grips: Colour = (0.18, 0.34, 0.62, 1.0)
     inside: Colour = (0.30, 0.46, 0.72, 1.0)
 
-    def radius(self, z: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    def radius(self, z: float | Float[np.ndarray, "*n"]) -> float | Float[np.ndarray, "*n"]:
         """Of the outer wall at height `z`: the parabola through foot, belly and rim."""
         t = np.asarray(z) / self.height
         weights = np.stack([(t - 0.4) * (t - 1) / 0.4, t * (1 - t) / 0.24, t * (t - 0.4) / 0.6], -1)
@@ -109,16 +109,16 @@ def design(index: int) -> Pitcher:
         belly=round(float(belly), 4),
         rim=round(float(belly * rim), 4),
         height=round(float(height), 4),
-        wall=round(float(rng.uniform(0.0024, 0.0034)), 4),
-        bottom=round(float(rng.uniform(0.0035, 0.0050)), 4),
-        corner=round(float(rng.uniform(0.006, 0.012)), 4),
-        lip=round(float(rng.uniform(0.016, 0.024)), 4),
-        rise=round(float(rng.uniform(0.004, 0.012)), 4),
-        reach=round(float(rng.uniform(0.043, 0.052)), 4),
+        wall=uniform(rng, 0.0024, 0.0034),
+        bottom=uniform(rng, 0.0035, 0.0050),
+        corner=uniform(rng, 0.006, 0.012),
+        lip=uniform(rng, 0.016, 0.024),
+        rise=uniform(rng, 0.004, 0.012),
+        reach=uniform(rng, 0.043, 0.052),
         grip=round(float(rng.uniform(0.56, 0.70)), 3),
         square=round(float(rng.uniform(2.1, 3.4)), 2),
-        thick=round(float(rng.uniform(0.010, 0.013)), 4),
-        wide=round(float(rng.uniform(0.019, 0.025)), 4),
+        thick=uniform(rng, 0.010, 0.013),
+        wide=uniform(rng, 0.019, 0.025),
         density=round(float(rng.uniform(950.0, 1500.0)), 0),
         colour=wall,
         band=band,
@@ -130,7 +130,7 @@ def design(index: int) -> Pitcher:
 def generate(index: int = 0) -> Specimen:
     """Instance `index`: handle along +x."""
     jug = design(index)
-    outer = float(jug.radius(np.array(0.55 * jug.height)))
+    outer = float(jug.radius(0.55 * jug.height))
     half = 0.5 * jug.grip * jug.height
     low = (outer + 0.012, -jug.wide / 2, 0.55 * jug.height - half)
     high = (outer + jug.reach, jug.wide / 2, 0.55 * jug.height + half)

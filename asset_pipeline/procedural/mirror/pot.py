@@ -21,7 +21,7 @@ from asset_pipeline.procedural.pieces import (
 )
 from asset_pipeline.procedural.revolution import fillet
 from asset_pipeline.procedural.shell import revolved_loops, shell_piece
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar_loops, convex_chunks, loft_outwards
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
@@ -85,12 +85,12 @@ def design(index: int) -> Pot:
         width=round(float(width), 4),
         taper=round(float(rng.choice((0.0, 0.0, 0.012, 0.024))), 4),
         height=round(float(height), 4),
-        wall=round(float(rng.uniform(0.0020, 0.0028)), 4),
-        bottom=round(float(rng.uniform(0.0035, 0.0050)), 4),
-        corner=round(float(rng.uniform(0.006, 0.013)), 4),
+        wall=uniform(rng, 0.0020, 0.0028),
+        bottom=uniform(rng, 0.0035, 0.0050),
+        corner=uniform(rng, 0.006, 0.013),
         flange=round(float(rng.choice((0.0012, 0.003, 0.005))), 4),
         handle="bar" if index % 2 else "strap",
-        reach=round(float(rng.uniform(0.036, 0.046)), 4),
+        reach=uniform(rng, 0.036, 0.046),
         span=round(float(width * rng.uniform(0.46, 0.56)), 4),
         level=round(float(rng.uniform(0.68, 0.82)), 3),
         density=round(float(rng.uniform(1700.0, 2300.0)), 0),

@@ -14,7 +14,6 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.moulded import (
     facing,
     moulded,
@@ -26,7 +25,8 @@ from asset_pipeline.procedural.moulded import (
 )
 from asset_pipeline.procedural.pieces import AreaBox, rigid_specimen
 from asset_pipeline.procedural.solids import ellipse
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 RED: Colour = (0.82, 0.12, 0.12, 1.0)
@@ -67,7 +67,7 @@ class Remote:
 
 _BLACK: Colour = (0.13, 0.13, 0.14, 1.0)
 # Case, back, buttons.
-_LOOKS: tuple[tuple[Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour], ...] = (
     ((0.70, 0.71, 0.73, 1.0), (0.50, 0.51, 0.53, 1.0), (0.20, 0.20, 0.22, 1.0)),
     (WHITE, (0.80, 0.80, 0.80, 1.0), (0.62, 0.63, 0.65, 1.0)),
     (_BLACK, _BLACK, WHITE),
@@ -90,9 +90,9 @@ def design(index: int) -> Remote:
         "player": (0.145, 0.180),
         "streamer": (0.122, 0.155),
     }[style]
-    length = drawn(rng, low, high)
-    broad = drawn(rng, 0.050, 0.060) if style != "streamer" else drawn(rng, 0.042, 0.050)
-    thick = drawn(rng, 0.026, 0.032)
+    length = uniform(rng, low, high)
+    broad = uniform(rng, 0.050, 0.060) if style != "streamer" else uniform(rng, 0.042, 0.050)
+    thick = uniform(rng, 0.026, 0.032)
     return Remote(
         style,
         length,
@@ -100,10 +100,10 @@ def design(index: int) -> Remote:
         round(broad * float(rng.uniform(0.60, 0.67)), 4),
         thick,
         round(thick * float(rng.uniform(0.42, 0.50)), 4),
-        corner=drawn(rng, 0.006, 0.016),
-        edge=drawn(rng, 0.0025, 0.006),
+        corner=uniform(rng, 0.006, 0.016),
+        edge=uniform(rng, 0.0025, 0.006),
         density=round(float(rng.uniform(540.0, 680.0)), 0),
-        **dict(zip(("case", "back", "button"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("case", "back", "button"), in_turn(index, _COLOURS), strict=True)),
     )
 
 
@@ -134,7 +134,7 @@ def generate(index: int = 0) -> Specimen:
     )
 
 
-def _height(remote: Remote, x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+def _height(remote: Remote, x: float | Float[np.ndarray, "*n"]) -> float | Float[np.ndarray, "*n"]:
     """Of the upper side, which slopes evenly."""
     return remote.thick + (remote.thin - remote.thick) * (x / remote.length + 0.5)
 
@@ -204,5 +204,5 @@ def _ring(remote: Remote, shapes: list[Shape], share: float, radius: float) -> N
 def _on_top(remote: Remote, x: float, side: float, above: float = 0.0) -> Float[np.ndarray, "4 4"]:
     """The frame of the upper side at a place: x across, y towards the slim end."""
     slope = (remote.thin - remote.thick) / remote.length
-    at = (x, side, float(_height(remote, np.array(x))) + above)
+    at = (x, side, float(_height(remote, x)) + above)
     return facing((-slope, 0.0, 1.0), at, up=(1.0, 0.0, 0.0))

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import shape_mass_properties
+from asset_pipeline.geometry.mass import shape_mass_properties
 from asset_pipeline.procedural.moulded import (
     ON_EDGE,
     facing,
@@ -26,7 +25,8 @@ from asset_pipeline.procedural.moulded import (
 )
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.solids import box, ellipse
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 STEEL: Colour = (0.78, 0.79, 0.80, 1.0)
@@ -66,7 +66,7 @@ class SteelTape:
 _YELLOW: Colour = (0.97, 0.85, 0.22, 1.0)
 _WHITE: Colour = (0.94, 0.94, 0.92, 1.0)
 # Cover, rubber, label, blade.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     ((0.80, 0.14, 0.12, 1.0), (0.16, 0.16, 0.17, 1.0), _WHITE, _YELLOW),
     ((0.16, 0.36, 0.62, 1.0), (0.12, 0.12, 0.13, 1.0), (0.85, 0.86, 0.87, 1.0), _WHITE),
     ((0.90, 0.44, 0.10, 1.0), (0.22, 0.22, 0.23, 1.0), INK, _YELLOW),
@@ -89,17 +89,17 @@ def design(index: int) -> SteelTape:
     rng = specimen_rng("steel_tape", index)
     length, height, thickness, blade, density = _KINDS[index % len(_KINDS)]
     return SteelTape(
-        drawn(rng, *length),
-        drawn(rng, *height),
-        drawn(rng, *thickness),
-        nose=drawn(rng, 0.32, 0.50),
-        slope=drawn(rng, 0.30, 0.66),
-        crown=drawn(rng, 0.22, 0.48),
-        out=drawn(rng, 0.009, 0.013),
+        uniform(rng, *length),
+        uniform(rng, *height),
+        uniform(rng, *thickness),
+        nose=uniform(rng, 0.32, 0.50),
+        slope=uniform(rng, 0.30, 0.66),
+        crown=uniform(rng, 0.22, 0.48),
+        out=uniform(rng, 0.009, 0.013),
         blade=blade,
-        edge=drawn(rng, 0.003, 0.007),
+        edge=uniform(rng, 0.003, 0.007),
         density=round(density * float(rng.uniform(0.95, 1.05)), 0),
-        **dict(zip(("cover", "rubber", "label", "strip"), in_turn(index, _LOOKS), strict=True)),
+        **dict(zip(("cover", "rubber", "label", "strip"), in_turn(index, _COLOURS), strict=True)),
     )
 
 
@@ -133,8 +133,8 @@ def _case(tape: SteelTape) -> Piece:
     prints = [shape for side in sides for shape in side]
     case = placed(case, ON_EDGE)
     button, block = _lock(tape)
-    looks = (*case.visual, *prints, *_clip(tape, middle), button)
-    return Piece(looks, (*case.collision, block), case.mass)
+    visuals = (*case.visual, *prints, *_clip(tape, middle), button)
+    return Piece(visuals, (*case.collision, block), case.mass)
 
 
 def _side(tape: SteelTape, side: float, middle: np.ndarray) -> list[Shape]:

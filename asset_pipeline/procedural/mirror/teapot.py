@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import revolved_mass
 from asset_pipeline.procedural.solids import loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
 from asset_pipeline.procedural.swept import bar, bar_loops
 from asset_pipeline.procedural.turned import banded, stacked_parts
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup
 
 WALL = 0.0035  # [m]
@@ -55,7 +55,7 @@ class Teapot:
     lid: Colour = (0.36, 0.18, 0.10, 1.0)
     grips: Colour = (0.36, 0.18, 0.10, 1.0)
 
-    def outline(self, u: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
+    def outline(self, u: float | Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 2"]:
         """Points `(r, z)` of the body's outside from the foot, `u = 0`, to the mouth, `u = 1`."""
         ends = [-((1 - self.foot**self.power) ** (1 / self.power))]
         ends.append((1 - self.mouth**self.power) ** (1 / self.power))
@@ -63,7 +63,7 @@ class Teapot:
         r = self.width / 2 * (1 - np.abs(s) ** self.power) ** (1 / self.power)
         return np.stack([r, self.height * u**self.low], axis=-1)
 
-    def radius(self, z: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    def radius(self, z: float | Float[np.ndarray, "*n"]) -> float | Float[np.ndarray, "*n"]:
         """Of the body at height `z`."""
         return self.outline((np.asarray(z) / self.height) ** (1 / self.low))[..., 0]
 
@@ -105,10 +105,10 @@ def design(index: int) -> Teapot:
         foot=foot,
         mouth=mouth,
         low=low,
-        dome=round(float(rng.uniform(0.008, 0.018)), 4),
-        knob=round(float(rng.uniform(0.010, 0.0135)), 4),
-        spout=round(float(rng.uniform(0.052, 0.064)), 4),
-        handle=round(float(rng.uniform(0.031, 0.038)), 4),
+        dome=uniform(rng, 0.008, 0.018),
+        knob=uniform(rng, 0.010, 0.0135),
+        spout=uniform(rng, 0.052, 0.064),
+        handle=uniform(rng, 0.031, 0.038),
         square=round(float(rng.uniform(2.0, 3.2)), 2),
         density=round(float(rng.uniform(1900.0, 2300.0)), 0),
         colour=colour,
@@ -177,7 +177,7 @@ def _body(pot: Teapot) -> Piece:
 def _spout(pot: Teapot) -> Piece:
     """A tapering tube along a parabola, with a dark opening at its end."""
     root = 0.42 * pot.height
-    start = np.array([pot.radius(np.array(root)) - 0.006, root])
+    start = np.array([pot.radius(root) - 0.006, root])
     tip = np.array([pot.width / 2 + pot.spout, 0.98 * pot.height])
     bend = np.array([pot.width / 2 + 0.60 * pot.spout, 0.42 * pot.height])
     t = np.linspace(0, 1, 19)[:, None]

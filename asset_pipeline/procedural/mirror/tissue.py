@@ -13,13 +13,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.moulded import facing, moulded, printed, rectangle, slab_loops
 from asset_pipeline.procedural.pieces import AreaBox, Piece, rigid_specimen
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, loft
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, rotation_about
 
 PAPER: Colour = (0.97, 0.97, 0.96, 1.0)
@@ -56,7 +56,7 @@ class TissueBox:
 
 
 # Carton, band, ink.
-_LOOKS: tuple[tuple[Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour], ...] = (
     ((0.80, 0.55, 0.62, 1.0), (0.98, 0.93, 0.92, 1.0), (0.56, 0.22, 0.34, 1.0)),
     ((0.55, 0.70, 0.50, 1.0), (0.94, 0.95, 0.86, 1.0), (0.20, 0.40, 0.24, 1.0)),
     ((0.90, 0.87, 0.80, 1.0), (0.78, 0.66, 0.50, 1.0), (0.44, 0.34, 0.24, 1.0)),
@@ -72,28 +72,28 @@ def design(index: int) -> TissueBox:
         return TissueBox()
     rng = specimen_rng("tissue", index)
     if index % 4 == 2:
-        length = width = drawn(rng, 0.111, 0.120)
-        height = drawn(rng, 0.050, 0.070)
+        length = width = uniform(rng, 0.111, 0.120)
+        height = uniform(rng, 0.050, 0.070)
     elif index % 4 == 3:
         length, width, height = (
-            drawn(rng, 0.125, 0.165),
-            drawn(rng, 0.064, 0.072),
-            drawn(rng, 0.052, 0.078),
+            uniform(rng, 0.125, 0.165),
+            uniform(rng, 0.064, 0.072),
+            uniform(rng, 0.052, 0.078),
         )
     else:
         length, width, height = (
-            drawn(rng, 0.175, 0.232),
-            drawn(rng, 0.096, 0.120),
-            drawn(rng, 0.045, 0.070),
+            uniform(rng, 0.175, 0.232),
+            uniform(rng, 0.096, 0.120),
+            uniform(rng, 0.045, 0.070),
         )
-    carton, band, ink = in_turn(index, _LOOKS)
+    carton, band, ink = in_turn(index, _COLOURS)
     return TissueBox(
         length,
         width,
         height,
-        slot=drawn(rng, 0.50, 0.66),
-        out=drawn(rng, 0.040, 0.056),
-        spread=drawn(rng, 0.92, 1.12),
+        slot=uniform(rng, 0.50, 0.66),
+        out=uniform(rng, 0.040, 0.056),
+        spread=uniform(rng, 0.92, 1.12),
         folds=int(rng.choice((4, 6, 8))),
         density=round(float(rng.uniform(120.0, 190.0)), 0),
         carton=carton,

@@ -12,14 +12,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.procedural.handles import superellipse
 from asset_pipeline.procedural.mirror.airframe import fin, nacelle, propeller, wheel_on_leg
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part
 from asset_pipeline.procedural.solids import ellipse, loft, print_on_face, rounded_rectangle
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
+from asset_pipeline.procedural.tool_handles import superellipse
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose
 
 GLASS: Colour = (0.16, 0.22, 0.32, 1.0)

@@ -13,9 +13,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.mass import solid_mass_properties
-from asset_pipeline.procedural.handles import superellipse
+from asset_pipeline.geometry.mass import solid_mass_properties
 from asset_pipeline.procedural.mirror.car_parts import CHROME, arch, lamps, pane, road_wheel
 from asset_pipeline.procedural.pieces import AreaBox, Piece, placed, rigid_specimen, solid_piece
 from asset_pipeline.procedural.revolution import convex_part, halves
@@ -27,6 +25,8 @@ from asset_pipeline.procedural.solids import (
 )
 from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, mixed, specimen_rng
 from asset_pipeline.procedural.swept import convex_chunks, loft_outwards
+from asset_pipeline.procedural.tool_handles import superellipse
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose
 
 Style = Literal["saloon", "hatchback", "sports", "van", "pickup"]
@@ -193,14 +193,14 @@ def _body(car: Car) -> Piece:
         rgba=car.colour,
         density=car.density,
     )
-    looks = lamps(car.length, car.width, (car.clearance, car.nose), front=True)
-    looks += lamps(car.length, car.width, (car.clearance, car.boot), front=False)
+    visuals = lamps(car.length, car.width, (car.clearance, car.nose), front=True)
+    visuals += lamps(car.length, car.width, (car.clearance, car.boot), front=False)
     floor = car.clearance + 0.12 * (car.belt - car.clearance)
     for side in (-1.0, 1.0):
         for end in (-0.5, 0.5):
             at = np.array([end * car.base * car.length, side * car.width / 2, car.wheel])
-            looks.append(arch(at, 1.12 * car.wheel, floor))
-    return Piece((*body.visual, *looks), body.collision, body.mass)
+            visuals.append(arch(at, 1.12 * car.wheel, floor))
+    return Piece((*body.visual, *visuals), body.collision, body.mass)
 
 
 def _cabin(car: Car) -> Piece:
@@ -229,7 +229,7 @@ def _cabin(car: Car) -> Piece:
         *halves(convex_part(rings[[2, 4], :].reshape(-1, 3))),
     ]
     mass = solid_mass_properties(loft(rings), 0.4 * car.density * float(loft(rings).volume))
-    looks = [
+    visuals = [
         Shape("mesh", mesh=loft(rings[:3], caps=(True, False)), rgba=car.colour),
         Shape("mesh", mesh=loft(rings[2:], caps=(False, True)), rgba=car.top),
     ]
@@ -237,7 +237,7 @@ def _cabin(car: Car) -> Piece:
     b, t = car.belt, car.roof
     screen = [(xs, -low, b), (xs, low, b), (xf, high, t), (xf, -high, t)]
     rear = [(xb, low, b), (xb, -low, b), (xr, -high, t), (xr, high, t)]
-    looks += [pane(screen, 0.12), pane(rear, 0.14)]
+    visuals += [pane(screen, 0.12), pane(rear, 0.14)]
     for s in (-1.0, 1.0):
         panes = ((0.0, 0.46), (0.46, 1.0))
         if car.style == "van":
@@ -255,8 +255,8 @@ def _cabin(car: Car) -> Piece:
                 (xs_high[1], s * high, t),
                 (xs_high[0], s * high, t),
             ]
-            looks.append(pane(corners if s < 0 else [corners[k] for k in (1, 0, 3, 2)], 0.10))
-    return Piece(tuple(looks), tuple(parts), mass)
+            visuals.append(pane(corners if s < 0 else [corners[k] for k in (1, 0, 3, 2)], 0.10))
+    return Piece(tuple(visuals), tuple(parts), mass)
 
 
 def _bed(car: Car) -> list[Piece]:

@@ -15,15 +15,15 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.geometry import Shape
-from asset_pipeline.procedural.handles import ALONG_X
-from asset_pipeline.procedural.lying import LONG_Y, OVER, along_face
+from asset_pipeline.procedural.flat_objects import LONG_Y, OVER, along_face
 from asset_pipeline.procedural.moulded import facing, moulded, printed, rectangle, slab_loops
 from asset_pipeline.procedural.pieces import UPRIGHT, AreaBox, Piece, placed, rigid_specimen
 from asset_pipeline.procedural.snap_strap import snap_strap
 from asset_pipeline.procedural.solids import ellipse
-from asset_pipeline.procedural.specimen import Colour, Specimen, drawn, in_turn, specimen_rng
+from asset_pipeline.procedural.specimen import Colour, Specimen, in_turn, specimen_rng, uniform
+from asset_pipeline.procedural.tool_handles import ALONG_X
 from asset_pipeline.procedural.turned import turned
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.poses import SymmetryGroup, compose
 
 GOLD: Colour = (0.80, 0.66, 0.34, 1.0)
@@ -57,7 +57,7 @@ class Wallet:
 
 
 # Leather, gap, seam, metal.
-_LOOKS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
+_COLOURS: tuple[tuple[Colour, Colour, Colour, Colour], ...] = (
     ((0.13, 0.13, 0.14, 1.0), (0.05, 0.05, 0.05, 1.0), (0.34, 0.34, 0.36, 1.0), SILVER),
     ((0.66, 0.16, 0.20, 1.0), (0.36, 0.06, 0.09, 1.0), (0.84, 0.44, 0.46, 1.0), GOLD),
     ((0.70, 0.47, 0.27, 1.0), (0.40, 0.24, 0.12, 1.0), (0.90, 0.76, 0.56, 1.0), GOLD),
@@ -76,32 +76,32 @@ def design(index: int) -> Wallet:
     rng = specimen_rng("wallet", index)
     style: Style = in_turn(index, _STYLES)
     if style == "purse":
-        width = drawn(rng, 0.074, 0.096)
+        width = uniform(rng, 0.074, 0.096)
         length = round(width * float(rng.uniform(1.10, 1.28)), 4)
         thickness, tab, past = (
-            drawn(rng, 0.022, 0.032),
-            drawn(rng, 0.0045, 0.0054),
-            drawn(rng, 0.020, 0.023),
+            uniform(rng, 0.022, 0.032),
+            uniform(rng, 0.0045, 0.0054),
+            uniform(rng, 0.020, 0.023),
         )
     else:
         width, length, thickness = (
-            drawn(rng, 0.086, 0.098),
-            drawn(rng, 0.108, 0.124),
-            drawn(rng, 0.014, 0.026),
+            uniform(rng, 0.086, 0.098),
+            uniform(rng, 0.108, 0.124),
+            uniform(rng, 0.014, 0.026),
         )
         if index % 5 == 3:
-            length = drawn(rng, 0.180, 0.196)
-        tab, past = drawn(rng, 0.018, 0.021), drawn(rng, 0.018, 0.021)
+            length = uniform(rng, 0.180, 0.196)
+        tab, past = uniform(rng, 0.018, 0.021), uniform(rng, 0.018, 0.021)
     return Wallet(
         style,
         width,
         length,
         thickness,
-        drawn(rng, 0.004, 0.009),
+        uniform(rng, 0.004, 0.009),
         tab if style != "fold" else 0.0,
         past if style != "fold" else 0.0,
         round(float(rng.uniform(520.0, 720.0)) * (0.7 if style == "purse" else 1.0), 0),
-        *in_turn(index, _LOOKS),
+        *in_turn(index, _COLOURS),
     )
 
 

@@ -1,0 +1,256 @@
+"""Build asset folders from the objects of a source, in parallel, resumably."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from asset_pipeline.build.articulated import build_articulated
+from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
+from asset_pipeline.build.relabel import OVERRIDE, relabelled, write_measured
+from asset_pipeline.build.rigid import finish_rigid
+from asset_pipeline.build.workers.limited_call import LimitError, Limits, limited_call
+from asset_pipeline.geometry.convexify import ConvexSettings, convexify
+from asset_pipeline.geometry.mass import shell_mass_properties, solid_mass_properties
+from asset_pipeline.geometry.repair import closed
+from asset_pipeline.labelling.overrides.applying import overridden
+from asset_pipeline.labelling.overrides.reading import LABELS_FILE, Override, read_overrides
+from asset_pipeline.labelling.scan_label import scan_label
+from asset_pipeline.sources import google_scanned_objects, omniobject3d, pace, ycb
+from asset_pipeline.sources.articulated_scan import ArticulatedScan
+from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
+from asset_pipeline.sources.scan import Scan, ScanItem, write_texture
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import read_asset
+from manipose_mj.assets.geometry import Body, MassProperties, Shape
+from manipose_mj.errors import InputError, unknown_name
+
+log = logging.getLogger(__name__)
+
+# A source is a module with `items(path)`, `inputs(item)` and the context manager `opened(item)`.
+SOURCES: dict[str, ModuleType] = {
+    "google_scanned_objects": google_scanned_objects,
+    "omniobject3d": omniobject3d,
+    "pace": pace,
+    "partnet_mobility": partnet_mobility,
+    "ycb": ycb,
+}
+# To be raised with every change that alters what is built.
+GENERATOR_VERSION = 4
+# Of household objects whose mass nobody published: between foam (150) and filled bottles (1000).
+DENSITY = 400.0  # [kg/m^3]
+DEFAULT_LIMITS = Limits()
+
+
+def build(
+    source: str,
+    path: Path,
+    out: Path,
+    *,
+    jobs: int = 1,
+    only: Sequence[str] = (),
+    limits: Limits = DEFAULT_LIMITS,
+    labels: Path | None = None,
+    progress: Callable[[BuildResult, int], None] | None = None,
+) -> list[BuildResult]:
+    """Build every object at `path` into `out/<name>`.
+
+    An asset whose inputs and generator are unchanged is left alone; one bad object never stops the
+    rest. Every object is read and built in a process that is killed at a limit. The caller sees each
+    result as it comes, so that a terminal can show a bar; see `pool.run_jobs` for clusters.
+
+    Args:
+      source: A key of `SOURCES`.
+      path: What the source reads: a folder of objects, or one object.
+      out: Folder of asset folders; made if it is not there.
+      jobs: Worker processes.
+      only: Names of the objects to build; empty for all.
+      limits: Of each object.
+      labels: A person's labels, which override what is measured; see `labelling.overrides`. None:
+        `labels.yaml` in `out`, where there is one.
+      progress: Called with each result and the number of objects in all.
+
+    Returns:
+      One result an object, sorted by name.
+
+    Raises:
+      InputError: The source or a name in `only` is unknown, `path` holds no object, the labels are
+        wrong, or `out` cannot be written.
+    """
+    if source not in SOURCES:
+        raise unknown_name("source", source, SOURCES)
+    # Objects are built in processes with other working directories.
+    path, out = Path(path).absolute(), Path(out).absolute()
+    found = {item.name: item for item in _items(source, path, limits)}
+    for name in only:
+        if name not in found:
+            raise unknown_name(f"object in {path}", name, found)
+    require_writable(out)
+    overrides = _overrides(labels, out, found)
+    return run_jobs(
+        [
+            BuildJob(
+                name=name,
+                folder=out / name,
+                where=str(found[name].path),
+                build=build_item,
+                arguments=(source, found[name], overrides.get(name)),
+                limits=limits,
+            )
+            for name in (sorted(set(only)) or sorted(found))
+        ],
+        jobs=jobs,
+        progress=progress,
+    )
+
+
+def build_item(
+    source: str, item: ScanItem, override: Override | None, folder: Path, target: Path
+) -> bool:
+    """Build one object into `target`, and return True, unless `folder` is up to date.
+
+    Raises:
+      InputError: The object, or what a person said of its label, cannot be used.
+    """
+    module = SOURCES[source]
+    said = {} if override is None else {OVERRIDE: override.digest}
+    if up_to_date(folder, module.inputs(item) | said, generator()):
+        return False
+    with module.opened(item) as scan:
+        if isinstance(scan, ArticulatedScan):
+            provenance = replace(scan.provenance, generator=generator())
+            asset = build_articulated(replace(scan, provenance=provenance), target)
+            if override is not None:
+                relabelled(asset, override)
+        else:
+            build_scan(scan, target, override)
+    return True
+
+
+def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> Asset:
+    """Label, decompose and weigh one scan, and write its asset folder."""
+    label, quality = scan_label(
+        scan.mesh,
+        scan.object_type,
+        scan.up,
+        category=scan.category,
+        functional=scan.functional,
+        textured=scan.texture is not None,
+        texture=scan.texture,
+    )
+    measured = Asset(
+        folder=folder,
+        name=scan.name,
+        kind="rigid",
+        category=scan.category,
+        label=label,
+        up=np.asarray(scan.up, float),
+        mass_properties=scan_mass_properties(scan),
+        stable_poses=(),
+        provenance=replace(scan.provenance, generator=generator()),
+        label_quality=quality,
+    )
+    draft = measured
+    if override is not None:
+        draft = overridden(measured, override, scan.mesh, textured=scan.texture is not None)
+        inputs = draft.provenance.inputs | {OVERRIDE: override.digest}
+        draft = replace(draft, provenance=replace(draft.provenance, inputs=inputs))
+    if scan.texture is None and getattr(scan.mesh.visual, "uv", None) is not None:
+        log.warning("%s: its texture is not there; built without", scan.name)
+    parts = convexify(scan.mesh)
+    with tempfile.TemporaryDirectory(prefix="manipose-texture-") as scratch:
+        texture = scan.texture and write_texture(scan.texture, Path(scratch) / "texture.png")
+        body = Body(
+            name=scan.name,
+            collision=parts,
+            visual=(Shape(kind="mesh", mesh=scan.mesh, texture=texture),),
+            mass_properties=draft.mass_properties,
+        )
+        asset = finish_rigid(
+            folder,
+            name=scan.name,
+            category=draft.category,
+            label=draft.label,
+            up=draft.up,
+            body=body,
+            provenance=draft.provenance,
+            label_quality=draft.label_quality,
+        )
+    if override is not None:
+        write_measured(folder, measured)
+    return asset
+
+
+def scan_mass_properties(scan: Scan) -> MassProperties:
+    """Mass and inertia of a scan: published mass, else volume times 400 kg/m^3."""
+    solid = closed(scan.mesh)
+    if solid is None:
+        log.warning("%s: the surface cannot be closed; mass and inertia are its hull's", scan.name)
+        solid = scan.mesh.convex_hull
+    mass = scan.mass
+    if mass is None:
+        mass = DENSITY * float(solid.volume)
+        log.info("%s: mass unknown; taken as %.3f kg from its volume", scan.name, mass)
+    if scan.fill == "shell":
+        return shell_mass_properties(solid, mass)
+    return solid_mass_properties(solid, mass)
+
+
+def generator() -> str:
+    """The version and settings that an asset was built with, as its provenance records them."""
+    settings = repr(sorted(asdict(ConvexSettings()).items())).encode()
+    return f"asset_pipeline.build.data_set {GENERATOR_VERSION} {hashlib.sha256(settings).hexdigest()[:12]}"
+
+
+def up_to_date(folder: Path, inputs: dict[str, str], generator: str) -> bool:
+    """Whether an asset folder was built from these inputs by this generator."""
+    try:
+        provenance = read_asset(folder).provenance
+    except InputError:
+        return False
+    return provenance.inputs == inputs and provenance.generator == generator
+
+
+def require_writable(out: Path) -> None:
+    """Make the folder.
+
+    Raises:
+      InputError: It cannot be written.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror})") from None
+
+
+def _overrides(labels: Path | None, out: Path, found: dict[str, ScanItem]) -> dict[str, Override]:
+    """A person's labels; a line for each that is of no object here."""
+    path = out / LABELS_FILE if labels is None else labels
+    if labels is None and not path.exists():
+        return {}
+    overrides = read_overrides(path)
+    for name in overrides:
+        # A file may serve several sources that are built into one folder.
+        if name not in found and not (out / name).is_dir():
+            log.warning("%s: %s", path, unknown_name("object", name, found))
+    return overrides
+
+
+def _items(source: str, path: Path, limits: Limits) -> list[ScanItem]:
+    """What the source finds, looking into archives under the same limits."""
+    with tempfile.TemporaryDirectory(prefix="manipose-list-") as scratch:
+        outcome = limited_call(SOURCES[source].items, path, limits=limits, scratch=Path(scratch))
+    if isinstance(outcome.error, LimitError):
+        raise InputError(f"{path}: cannot be listed ({outcome.error})")
+    if outcome.error is not None:
+        raise outcome.error
+    return outcome.value

@@ -1,0 +1,54 @@
+"""What is seen of a link: one mesh for each colour or texture, with no more faces than rendering needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh.visual import TextureVisuals
+
+from asset_pipeline.sources.articulated_scan import PartMesh, Surface
+from asset_pipeline.sources.scan import write_texture
+from manipose_mj.assets.geometry import Shape
+
+MAX_FACES = 8000  # of one mesh; only untextured meshes are decimated
+
+
+def link_visuals(parts: Sequence[PartMesh], textures: Path) -> tuple[Shape, ...]:
+    """Visual shapes: the surfaces of all parts, joined where colour or texture is the same.
+
+    Args:
+      parts: Of one link.
+      textures: Folder for the textures as PNG; must outlast the shapes.
+    """
+    groups: dict[tuple[Path | None, tuple[float, ...]], list[Surface]] = {}
+    for surface in (s for part in parts for s in part.surfaces):
+        rgba = (1.0, 1.0, 1.0, 1.0) if surface.texture else surface.rgba
+        groups.setdefault((surface.texture, rgba), []).append(surface)
+    shapes = []
+    for (texture, _), surfaces in groups.items():
+        mesh = _joined(surfaces)
+        if not len(mesh.faces):
+            continue
+        image = None
+        if texture is not None:
+            image = write_texture(texture, textures / f"{texture.stem}.png")
+        elif len(mesh.faces) > MAX_FACES:
+            mesh = mesh.simplify_quadric_decimation(face_count=MAX_FACES)
+        shapes.append(Shape("mesh", mesh=mesh, rgba=surfaces[0].rgba, texture=image))
+    return tuple(shapes)
+
+
+def _joined(surfaces: Sequence[Surface]) -> trimesh.Trimesh:
+    vertices = np.concatenate([np.asarray(s.mesh.vertices) for s in surfaces])
+    starts = np.cumsum([0, *(len(s.mesh.vertices) for s in surfaces)])
+    faces = [np.asarray(s.mesh.faces) + n for s, n in zip(surfaces, starts, strict=False)]
+    mesh = trimesh.Trimesh(vertices, np.concatenate(faces), process=False)
+    if surfaces[0].texture is not None:
+        uv = [s.mesh.visual.uv for s in surfaces if isinstance(s.mesh.visual, TextureVisuals)]
+        mesh.visual = TextureVisuals(uv=np.concatenate(uv))
+    mesh.update_faces(np.asarray(mesh.area_faces) > 1e-12)
+    mesh.remove_unreferenced_vertices()
+    return mesh

@@ -1,0 +1,135 @@
+"""Apply a person's labels to asset folders that are built already; rest poses and grasps stay."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+from xml.etree import ElementTree
+
+from asset_pipeline.build.emit import numbers
+from asset_pipeline.labelling.overrides.applying import overridden
+from asset_pipeline.labelling.overrides.reading import Override, read_overrides
+from manipose_mj.assets.asset import ASSET_FILE, MODEL_FILE, Asset
+from manipose_mj.assets.asset_json import list_assets, read_asset, write_asset_json
+from manipose_mj.assets.visible_shapes import surface, visible_shapes
+from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.storage.staging import put_in_place, staging
+
+# What `asset.json` said before a person overrode it.
+MEASURED_FILE = "measured.json"
+# In an asset's provenance: which entry of the labels file it has.
+OVERRIDE = "label override"
+# After the entry's digest: rest poses are those of the label before, so that a build is not up to date.
+IN_PLACE = " in place"
+
+
+def relabel(path: Path, labels: Path) -> list[Asset]:
+    """Give one asset folder, or all in a folder, the labels that a file says.
+
+    Assets without an entry get back what was measured. Each folder is replaced by one rename.
+
+    Args:
+      path: An asset folder, or a folder of asset folders.
+      labels: The labels file.
+
+    Returns:
+      The assets whose folder changed.
+
+    Raises:
+      InputError: A folder or the file cannot be read, an entry cannot be applied, or, for a whole
+        folder, an entry is of an object that is not there.
+    """
+    overrides = read_overrides(labels)
+    if (path / ASSET_FILE).is_file():
+        folders: Sequence[Path] = [path]
+    else:
+        folders = list_assets(path)
+        there = {read_asset(folder).name for folder in folders}
+        for name in overrides:
+            if name not in there:
+                raise InputError(f"{labels}: {unknown_name('object', name, there)}")
+    assets = [read_asset(folder) for folder in folders]
+    return [
+        relabelled(asset, overrides.get(asset.name))
+        for asset in assets
+        if not _has(asset, overrides.get(asset.name))
+    ]
+
+
+def relabelled(asset: Asset, override: Override | None) -> Asset:
+    """The asset with this override in place of any other one, written to its folder.
+
+    Raises:
+      InputError: The override cannot be applied.
+    """
+    before = measured(asset)
+    inputs = {key: value for key, value in before.provenance.inputs.items() if key != OVERRIDE}
+    after = before
+    if override is not None:
+        shapes = visible_shapes(asset.folder)
+        textured = any(s.texture is not None for own in shapes.values() for s in own)
+        after = overridden(before, override, surface(shapes), textured=textured)
+        inputs[OVERRIDE] = override.digest + IN_PLACE
+    after = replace(after, provenance=replace(after.provenance, inputs=inputs))
+    with staging(asset.folder) as scratch:
+        target = scratch / asset.folder.name
+        shutil.copytree(asset.folder, target)
+        (target / MEASURED_FILE).unlink(missing_ok=True)
+        write_asset_json(replace(after, folder=target))
+        if override is not None:
+            write_measured(target, before)
+        _write_model(target / MODEL_FILE, after)
+        put_in_place(target, asset.folder)
+    return read_asset(asset.folder)
+
+
+def measured(asset: Asset) -> Asset:
+    """The asset as it was before a person overrode its label."""
+    if not (asset.folder / MEASURED_FILE).is_file():
+        return asset
+    before = read_asset(asset.folder, MEASURED_FILE)
+    return replace(
+        asset,
+        category=before.category,
+        up=before.up,
+        label=before.label,
+        label_quality=before.label_quality,
+        mass_properties=before.mass_properties,
+        parts=before.parts,
+        areas=before.areas,
+    )
+
+
+def write_measured(folder: Path, before: Asset) -> None:
+    """Keep beside an overridden asset what was measured."""
+    write_asset_json(replace(before, folder=folder), MEASURED_FILE)
+
+
+def _has(asset: Asset, override: Override | None) -> bool:
+    """Whether the asset is labelled as the override says already."""
+    entry = asset.provenance.inputs.get(OVERRIDE)
+    if override is None:
+        return entry is None
+    return entry in (override.digest, override.digest + IN_PLACE)
+
+
+def _write_model(path: Path, asset: Asset) -> None:
+    """Put mass and joints into the model, where they differ."""
+    tree = ElementTree.parse(path)
+    before = path.read_text(encoding="utf-8")
+    properties, root = asset.mass_properties, tree.getroot()
+    if asset.kind == "rigid":
+        inertial = cast(ElementTree.Element, root.find(".//inertial"))
+        i = properties.inertia
+        inertial.set("mass", numbers([properties.mass]))
+        inertial.set("fullinertia", numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]))
+    for part in asset.parts:
+        joint = cast(ElementTree.Element, root.find(f".//joint[@name='{part.name}']"))
+        joint.set("pos", numbers(part.joint.origin))
+        joint.set("axis", numbers(part.joint.axis))
+    after = ElementTree.tostring(root, encoding="unicode")
+    if after != before:
+        path.write_text(after, encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Calls in processes of their own that are stopped at a limit of time or memory."""

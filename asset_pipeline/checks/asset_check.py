@@ -1,0 +1,237 @@
+"""Does a built asset behave? Each is loaded alone, dropped, and tested by what it then does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from joblib import Parallel, delayed
+
+from asset_pipeline.geometry.stable_poses import tilt
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.physics import REST_ANGULAR_SPEED, REST_LINEAR_SPEED
+from manipose_mj.assets.rest_scene import rest_scene
+from manipose_mj.errors import InputError
+from manipose_mj.poses import pose_to_vector, quaternion_to_rotation
+
+
+@dataclass(frozen=True)
+class CheckLimits:
+    """What an asset must satisfy; the speeds are those of a body at rest.
+
+    Attributes:
+      drop: Height of the fall [m].
+      settle_time: In which it must come to rest [s].
+      rest_time: How long the speeds must stay below the limits to count as rest [s].
+      linear_speed: [m/s]. angular_speed: [rad/s].
+      penetration: At rest [m].
+      tilt: Between the pose it was dropped in and the one it rests in [rad].
+      part_vertices: Of any collision mesh.
+      shut: How far a moving part may creep in `shut_time` seconds, as a share of its range.
+      reach: Share of its range that a moving part must reach.
+      force: On a sliding part [N]. torque: On a hinged one [N m].
+    """
+
+    drop: float = 0.03
+    settle_time: float = 4.0
+    rest_time: float = 0.2
+    linear_speed: float = REST_LINEAR_SPEED
+    angular_speed: float = REST_ANGULAR_SPEED
+    penetration: float = 0.002
+    tilt: float = np.deg2rad(10.0)
+    part_vertices: int = 32
+    shut: float = 0.01
+    shut_time: float = 2.0
+    reach: float = 0.95
+    force: float = 20.0
+    torque: float = 5.0
+
+
+LIMITS = CheckLimits()
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What one asset did.
+
+    Attributes:
+      name: The asset's folder name.
+      failures: One line for each limit it broke; empty if it passed.
+      settle_seconds: When it came to rest [s]; NaN for articulated assets and those that never did.
+      penetration: Deepest contact at rest [m].
+      tilt: From the pose it was dropped in, symmetries apart [rad].
+      parts: Number of collision geoms.
+      part_vertices: Most vertices of a collision mesh.
+      grasps: Number of sampled grasps.
+    """
+
+    name: str
+    failures: tuple[str, ...] = ()
+    settle_seconds: float = float("nan")
+    penetration: float = float("nan")
+    tilt: float = float("nan")
+    parts: int = 0
+    part_vertices: int = 0
+    grasps: int = 0
+
+    @property
+    def ok(self) -> bool:
+        """Whether the asset broke no limit."""
+        return not self.failures
+
+
+def check(
+    directory: Path | str,
+    *,
+    jobs: int = 1,
+    progress: Callable[[CheckResult, int], None] | None = None,
+) -> list[CheckResult]:
+    """Check every asset folder under `directory`, or `directory` itself where it is one.
+
+    Args:
+      directory: Folder of asset folders, or an asset folder.
+      jobs: Worker processes.
+      progress: Called with each result and the number of assets in all.
+
+    Returns:
+      One result an asset, sorted by name. A folder that cannot be read or loaded is a failure too.
+
+    Raises:
+      InputError: There is no asset.
+    """
+    directory = Path(directory)
+    alone = (directory / "asset.json").is_file()
+    folders = [directory] if alone else list_assets(directory)
+    results = []
+    calls = (delayed(check_asset)(folder) for folder in folders)
+    for result in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
+        results.append(result)
+        if progress is not None:
+            progress(result, len(folders))
+    return sorted(results, key=lambda r: r.name)
+
+
+def check_asset(folder: Path) -> CheckResult:
+    """Load one asset alone and test it."""
+    try:
+        asset = read_asset(folder)
+        model = rest_scene(asset.model_path, plane=asset.kind == "rigid")
+    except InputError as error:
+        return CheckResult(folder.name, (str(error),))
+    except (ValueError, mujoco.FatalError) as error:  # MuJoCo's compiler
+        line = " ".join(str(error).split())
+        return CheckResult(folder.name, (f"{folder}: model.xml does not compile: {line}",))
+    if asset.kind == "articulated":
+        return _check_articulated(asset, model)
+    return _check_rigid(asset, model)
+
+
+def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
+    failures = _shape_failures(model)
+    parts, vertices = _collision_parts(model)
+    grasps = 0 if asset.grasps is None else len(asset.grasps)
+    counts = {"parts": parts, "part_vertices": vertices, "grasps": grasps}
+    if model.nq != 7:
+        failures.append(f"model has {model.nq} coordinates; a rigid asset has one free joint")
+    if not asset.stable_poses:
+        failures.append("asset.json lists no stable pose")
+    if failures:
+        return CheckResult(asset.folder.name, tuple(failures), **counts)
+    start = max(asset.stable_poses, key=lambda p: p.probability)
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose_to_vector(start.pose)
+    data.qpos[2] += LIMITS.drop
+    settle_seconds = _settle(model, data)
+    depth = float(max(-data.contact.dist.min(), 0.0)) if data.ncon else 0.0
+    leaned = tilt(quaternion_to_rotation(data.qpos[3:7]), start.rotation, asset.label)
+    if not np.isfinite(data.qpos).all() or data.qpos[2] < -1.0:
+        failures.append("fell through the plane or became unstable")
+    if not np.isfinite(settle_seconds):
+        linear, angular = _speeds(data)
+        failures.append(
+            f"not at rest after {LIMITS.settle_time:g} s ({linear:.3f} m/s, {angular:.2f} rad/s)"
+        )
+    if depth > LIMITS.penetration:
+        failures.append(f"sinks {1e3 * depth:.1f} mm into the plane")
+    if leaned > LIMITS.tilt:
+        failures.append(
+            f"rests {np.rad2deg(leaned):.0f} deg from the stable pose it was dropped in"
+        )
+    return CheckResult(asset.folder.name, tuple(failures), settle_seconds, depth, leaned, **counts)
+
+
+def _settle(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Step until rest; the time at which it began [s], NaN if it did not come."""
+    steps = round(LIMITS.settle_time / model.opt.timestep)
+    still_since = np.nan
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+        linear, angular = _speeds(data)
+        if linear > LIMITS.linear_speed or angular > LIMITS.angular_speed or not data.ncon:
+            still_since = np.nan
+        elif np.isnan(still_since):
+            still_since = data.time
+        elif data.time - still_since >= LIMITS.rest_time:
+            return float(still_since)
+    return float("nan")
+
+
+def _speeds(data: mujoco.MjData) -> tuple[float, float]:
+    return float(np.linalg.norm(data.qvel[:3])), float(np.linalg.norm(data.qvel[3:6]))
+
+
+def _check_articulated(asset: Asset, model: mujoco.MjModel) -> CheckResult:
+    failures = _shape_failures(model)
+    parts, vertices = _collision_parts(model)
+    data = mujoco.MjData(model)
+    while data.time < LIMITS.shut_time:
+        mujoco.mj_step(model, data)
+    shut = data.qpos.copy()
+    for part in asset.parts:
+        joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"asset/{part.name}")
+        low, high = part.joint.range
+        opened = (shut[model.jnt_qposadr[joint]] - low) / (high - low)
+        if abs(opened) > LIMITS.shut:
+            failures.append(f"part {part.name!r} creeps to {100 * opened:.0f} % open, untouched")
+        reached = _pull(model, data, joint, part.joint.kind == "slide")
+        if (reached - low) / (high - low) < LIMITS.reach:
+            failures.append(
+                f"part {part.name!r} opens to {reached:.3f} of {high:.3f} under "
+                f"{LIMITS.force:g} N or {LIMITS.torque:g} N m"
+            )
+    return CheckResult(
+        asset.folder.name, tuple(failures), parts=parts, part_vertices=vertices, grasps=0
+    )
+
+
+def _pull(model: mujoco.MjModel, data: mujoco.MjData, joint: int, slides: bool) -> float:
+    """How far the joint gets under a steady pull, everything else shut [m or rad]."""
+    mujoco.mj_resetData(model, data)
+    data.qfrc_applied[model.jnt_dofadr[joint]] = LIMITS.force if slides else LIMITS.torque
+    while data.time < LIMITS.settle_time:
+        mujoco.mj_step(model, data)
+    return float(data.qpos[model.jnt_qposadr[joint]])
+
+
+def _shape_failures(model: mujoco.MjModel) -> list[str]:
+    parts, vertices = _collision_parts(model)
+    failures = []
+    if not parts:
+        failures.append("has no collision geom")
+    if vertices > LIMITS.part_vertices:
+        failures.append(
+            f"a collision part has {vertices} vertices; at most {LIMITS.part_vertices} are allowed"
+        )
+    return failures
+
+
+def _collision_parts(model: mujoco.MjModel) -> tuple[int, int]:
+    """Number of the asset's collision geoms, and the most vertices of one's mesh."""
+    solid = (model.geom_contype > 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    meshes = model.geom_dataid[solid & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)]
+    most = int(model.mesh_vertnum[meshes].max()) if len(meshes) else 0
+    return int(solid.sum()), most

@@ -1,0 +1,1 @@
+"""The commands `manipose assets build`, `check`, `fetch`, `label` and `relabel`."""

@@ -1,0 +1,118 @@
+"""`manipose assets build`: asset folders from the files of a data set, or of the built-in catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.errors import InputError
+
+CATALOGUE = "catalogue"
+
+
+def build_assets(
+    source: Annotated[Positional[str], arg(metavar="SOURCE")],
+    path: Annotated[Positional[Path | None], arg(metavar="PATH")] = None,
+    /,
+    *,
+    out: Annotated[Path | None, arg(metavar="DIR")] = None,
+    jobs: int = CORES,
+    only: Annotated[tuple[str, ...], arg(metavar="NAME...")] = (),
+    limit_s: float = 300.0,
+    dask: Annotated[str | None, arg(metavar="ADDRESS")] = None,
+    labels: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+) -> int:
+    """Build assets from scans: labels, convex parts, mass, stable poses, grasps, MJCF.
+
+    What is up to date is left alone, so that an interrupted build goes on where it was. Exits with
+    2 if an object could not be built; the others are there.
+
+    Args:
+      source: Kind of data set, such as ycb; or catalogue, the built-in objects, which need no PATH.
+      path: The data set's folder or archive, as published.
+      out: Folder for the assets, one folder each; without it, catalogue fills the cache that
+        tasks read.
+      jobs: Objects at the same time, one core each.
+      only: Objects to build, by name (of the catalogue, also categories); all without it.
+      limit_s: Seconds after which the reading and building of a scan is stopped.
+      dask: Build on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786; its workers have
+        to see PATH and DIR.
+      labels: A person's labels (YAML), which override what is measured; without it labels.yaml in
+        DIR, where there is one.
+    """
+    one_thread_per_process()
+    from asset_pipeline.build.data_set import SOURCES, BuildResult, build
+    from asset_pipeline.build.workers.limited_call import Limits
+    from asset_pipeline.catalogue.parallel_build import build_catalogue
+    from manipose_mj.console import output
+    from manipose_mj.errors import unknown_name
+
+    done: list[BuildResult] = []
+    with _cluster(dask), output.Progress("assets") as progress:
+
+        def show(result: BuildResult, total: int) -> None:
+            done.append(result)
+            progress.update(len(done), total, result.name)
+
+        if source == CATALOGUE:
+            if path is not None:
+                raise InputError(f"the catalogue is built in and reads no files; leave out {path}")
+            if labels is not None:
+                raise InputError(
+                    f"the catalogue's labels are exact by construction; leave out {labels}"
+                )
+            results = build_catalogue(out, jobs=jobs, only=only, progress=show)
+        else:
+            if source not in SOURCES:
+                raise unknown_name("source", source, [CATALOGUE, *SOURCES])
+            if path is None or out is None:
+                raise InputError(f"{source} needs the PATH of its files and --out DIR")
+            if not limit_s > 0:
+                raise InputError(f"--limit-s is {limit_s:g}; expected seconds, more than 0")
+            limits = Limits(seconds=limit_s)
+            results = build(
+                source, path, out, jobs=jobs, only=only, limits=limits, labels=labels, progress=show
+            )
+    failed = [r for r in results if r.status == "failed"]
+    for result in failed:
+        output.fail_line(f"{result.name}: {result.reason}")
+    built = [r for r in results if r.status == "built"]
+    console = output.standard_output()
+    console.print(
+        f"{len(built)} built, {len(results) - len(built) - len(failed)} up to date, "
+        f"{len(failed)} failed, in {out or 'the cache'}",
+        soft_wrap=True,
+    )
+    return 2 if failed else 0
+
+
+@contextmanager
+def _cluster(address: str | None) -> Iterator[None]:
+    """Run joblib's work on a dask cluster, if there is an address.
+
+    Raises:
+      InputError: `dask.distributed` is not installed, or nobody answers.
+    """
+    if address is None:
+        yield
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            "--dask needs dask.distributed; pip install 'manipose-mj[cluster]'"
+        ) from None
+    import joblib
+
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(f"--dask {address}: no scheduler answers ({reason})") from None
+    with client, joblib.parallel_config(backend="dask"):
+        yield

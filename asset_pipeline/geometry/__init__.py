@@ -1,0 +1,1 @@
+"""Geometry of meshes: repair, mass, convex collision shapes, resting poses."""

@@ -1,0 +1,1 @@
+"""A person's corrections of labels: reading, applying and writing `labels.yaml`."""

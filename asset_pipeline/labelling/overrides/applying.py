@@ -1,0 +1,177 @@
+"""Labels as a person overrode them: frames moved, or measured again from what the person said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from asset_pipeline.labelling.overrides.reading import FrameOverride, Override, PartOverride
+from asset_pipeline.labelling.scan_label import scan_label
+from manipose_mj.assets.asset import Area, Asset, MovingPart
+from manipose_mj.assets.geometry import MassProperties
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.assets.label_quality import LabelQuality
+from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
+
+
+def overridden(
+    asset: Asset, override: Override, surface: trimesh.Trimesh, *, textured: bool
+) -> Asset:
+    """The asset with what a person said in place of what was measured.
+
+    Another object type, up or functional direction has the label measured again; so has another
+    category of a tool, whose grip end it tells. Origin, axes and adjustments come after that.
+
+    Args:
+      asset: As measured.
+      override: The person's word.
+      surface: What is seen of the object, in the mesh frame, everything shut [m].
+      textured: Whether it has a texture.
+
+    Raises:
+      InputError: The object has no such part, handle or mass of its own; or it cannot be measured.
+    """
+    if asset.kind == "articulated":
+        for key in ("object_type", "functional", "mass", "up"):
+            if getattr(override, key) is not None:
+                raise InputError(
+                    f"{override.where}: {key}: an articulated object's follows from its parts; "
+                    "expected this field for rigid objects only"
+                )
+    for name in override.parts:
+        if name not in [part.name for part in asset.parts]:
+            raise InputError(
+                f"{override.where}: {unknown_name('part', name, [p.name for p in asset.parts])}"
+            )
+    category = override.category or asset.category
+    up = asset.up if override.up is None else override.up
+    found, quality = _measured(asset, override, surface, category, up, textured)
+    label = moved(found, override.frame)
+    if label is not found:
+        quality = None  # a person's word
+    if label is not asset.label:
+        label = replace(label, extents=np.ptp(surface.vertices @ label.rotation, axis=0))
+    return replace(
+        asset,
+        category=category,
+        up=up,
+        label=label,
+        label_quality=quality,
+        mass_properties=_weighed(asset.mass_properties, override.mass),
+        parts=tuple(_part(override, part) for part in asset.parts),
+        areas=tuple(_area(area, asset.label, label) for area in asset.areas),
+    )
+
+
+def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
+    """The label with another frame or symmetry; its extents are those of the old box in the new axes."""
+    if not frame_says_something(frame):
+        return label
+    origin = label.origin if frame.origin is None else frame.origin
+    rotation = label.rotation if frame.rotation is None else frame.rotation
+    origin = origin + rotation @ frame.shift
+    for axis, angle in zip(np.eye(3), frame.turn, strict=True):
+        rotation = rotation @ rotation_about(axis, angle)
+    return replace(
+        label,
+        origin=origin,
+        rotation=rotation,
+        extents=_box_along(rotation.T @ label.rotation, label.extents)
+        if frame.extents is None
+        else frame.extents,
+        symmetry=label.symmetry if frame.symmetry is None else frame.symmetry,
+    )
+
+
+def frame_says_something(frame: FrameOverride) -> bool:
+    """Whether the frame differs in anything from no override."""
+    named = (frame.origin, frame.rotation, frame.symmetry, frame.extents)
+    return any(v is not None for v in named) or bool(frame.turn.any() or frame.shift.any())
+
+
+def _measured(
+    asset: Asset,
+    override: Override,
+    surface: trimesh.Trimesh,
+    category: str,
+    up: Float[np.ndarray, "3"],
+    textured: bool,
+) -> tuple[PoseLabel, LabelQuality | None]:
+    """The asset's label, or a new one where what it was measured from is another."""
+    if asset.kind == "articulated":
+        return asset.label, asset.label_quality
+    object_type = override.object_type or asset.label.object_type
+    told = (override.object_type, override.up, override.functional)
+    another = any(v is not None for v in told)
+    if object_type == "functional":
+        another = another or category != asset.category
+    if not another:
+        return asset.label, asset.label_quality
+    if override.frame.whole:
+        return replace(asset.label, object_type=object_type), None
+    try:
+        return scan_label(
+            surface,
+            object_type,
+            up,
+            category=category,
+            functional=override.functional,
+            textured=textured,
+        )
+    except InputError as error:
+        raise InputError(f"{override.where}: cannot be measured as told ({error})") from None
+
+
+def _part(override: Override, part: MovingPart) -> MovingPart:
+    said: PartOverride | None = override.parts.get(part.name)
+    if said is None:
+        return part
+    handle, joint = part.handle, part.joint
+    if said.handle is not None:
+        handle = moved(handle or _new_handle(override, part.name, said.handle), said.handle)
+    if said.joint_origin is not None:
+        joint = replace(joint, origin=said.joint_origin)
+    if said.joint_axis is not None:
+        joint = replace(joint, axis=said.joint_axis)
+    return replace(part, handle=handle, joint=joint)
+
+
+def _new_handle(override: Override, part: str, frame: FrameOverride) -> PoseLabel:
+    """The label of a handle that was not found."""
+    if frame.origin is None or frame.rotation is None or frame.extents is None:
+        raise InputError(
+            f"{override.where}: parts: {part}: handle: none was found; "
+            "a new one needs origin, x, y and extents"
+        )
+    return PoseLabel(
+        frame.origin, frame.rotation, "handle", frame.extents, SymmetryGroup.identity()
+    )
+
+
+def _weighed(properties: MassProperties, mass: float | None) -> MassProperties:
+    if mass is None:
+        return properties
+    return replace(properties, mass=mass, inertia=properties.inertia * (mass / properties.mass))
+
+
+def _area(area: Area, old: PoseLabel, new: PoseLabel) -> Area:
+    """The same place in another label's frame: the smallest box along its axes."""
+    if new is old:
+        return area
+    T_new_old = invert(compose(new.rotation, new.origin)) @ old.pose
+    return replace(
+        area,
+        center=transform(T_new_old, area.center[None])[0],
+        extents=_box_along(T_new_old[:3, :3], area.extents),
+    )
+
+
+def _box_along(
+    rotation: Float[np.ndarray, "3 3"], extents: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3"]:
+    """Lengths of the smallest box along other axes around a box with these lengths."""
+    return np.abs(rotation) @ extents

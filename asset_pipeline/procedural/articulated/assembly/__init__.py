@@ -1,0 +1,1 @@
+"""Bodies, joints and cavities of furniture, assembled from portions."""

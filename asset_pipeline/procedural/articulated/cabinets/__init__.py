@@ -1,0 +1,1 @@
+"""Cabinets: kinds, layouts, sizes, carcasses, fronts."""

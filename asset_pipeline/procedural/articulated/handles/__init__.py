@@ -1,0 +1,1 @@
+"""Handles of furniture: bars, bows, edge pulls, knobs, and how they are mounted."""

@@ -1,0 +1,1 @@
+"""Parts of ovens and microwaves: cases, control panels, racks, turntables."""

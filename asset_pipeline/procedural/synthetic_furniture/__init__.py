@@ -1,0 +1,1 @@
+"""Random furniture that estimators are trained on; none of it is built as an asset."""

@@ -1,0 +1,1 @@
+"""PartNet-Mobility: `objects` is the source; its URDF, meshes and semantics, checked against each other."""

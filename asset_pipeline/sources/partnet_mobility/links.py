@@ -1,0 +1,232 @@
+"""From a URDF's tree of links to a base and the links that move against it, shut and in metres."""
+
+from __future__ import annotations
+
+import logging
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from asset_pipeline.sources.articulated_scan import LinkJoint, LinkRole, PartMesh, ScanLink, Surface
+from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_size, pose_of
+from asset_pipeline.sources.partnet_mobility.urdf import Urdf, UrdfJoint
+from asset_pipeline.sources.partnet_mobility.wavefront import read_wavefront
+from manipose_mj.errors import InputError
+from manipose_mj.poses import compose, rotation_about, transform
+
+log = logging.getLogger(__name__)
+
+FULL_TURN = 2 * np.pi
+MOVES = ("revolute", "prismatic", "continuous")
+MIN_TRAVEL = {"slide": 5e-4, "hinge": np.deg2rad(1.0)}  # [m, rad]; less is as good as fixed
+MAX_SIZE = 4.0  # [m]
+Side = Literal["depth", "width", "height"]
+
+
+def normalised_links(
+    folder: Path, urdf: Urdf, semantics: dict[str, Semantics]
+) -> tuple[ScanLink, list[ScanLink]]:
+    """The base and the moving links, shut, in the URDF's root frame and unit.
+
+    Raises:
+      InputError: A mesh cannot be used, or a link is left without any.
+    """
+    groups: dict[str, list[PartMesh]] = {}
+    joints: dict[str, UrdfJoint] = {}
+    for link in urdf.visuals:
+        chain = urdf.chain(link)
+        moving = [j for j in chain if j.kind in MOVES]
+        for joint in chain[-1:]:
+            if joint.kind not in (*MOVES, "fixed") or len(moving) > 1 and joint.kind in MOVES:
+                log.warning(
+                    "%s: link %r (%s) is taken as fixed to what it hangs on",
+                    folder,
+                    link,
+                    joint.kind,
+                )
+        top = moving[0].child if moving else urdf.root
+        if moving:
+            joints[top] = moving[0]
+        groups.setdefault(top, []).extend(_parts(folder, urdf, link, pose_of(chain)))
+    compare_size(folder, _mesh_bounds(urdf, groups))
+    base = ScanLink("base", tuple(groups.pop(urdf.root, ())))
+    if not base.parts:
+        raise InputError(
+            f"{folder}: nothing is fixed to the base; expected a body that parts move on"
+        )
+    found = []
+    for name, parts in groups.items():
+        if not parts:
+            log.warning("%s: link %r has no mesh; left out", folder, name)
+            continue
+        kind, role = joints[name].kind, _role(joints[name], semantics.get(name), parts)
+        log.debug("%s: %s is a %s %s", folder, name, kind, role)
+        frame = pose_of(urdf.chain(joints[name].parent)) @ joints[name].pose
+        found.append(_shut(ScanLink(name, tuple(parts), None, role), joints[name], frame, base))
+    return base, found
+
+
+def placed_links(
+    links: tuple[ScanLink, list[ScanLink]], side: Side, length: float
+) -> tuple[ScanLink, list[ScanLink]]:
+    """The links in metres, the middle of the base above the origin, nothing ever below z = 0.
+
+    An object stands on z = 0 unless a door that opens downwards would sweep below: then it stands as
+    much higher, as the plinth or the housing does that such an appliance is built into.
+
+    Args:
+      links: Base and moving links, z up and the front towards -x.
+      side: Of the bounding box, handles left out, that is known.
+      length: Of that side [m].
+    """
+    base, moving = links
+    bodies = [p.mesh for link in (base, *moving) for p in link.parts if p.name != "handle"]
+    low = np.min([m.bounds[0] for m in bodies], axis=0)
+    high = np.max([m.bounds[1] for m in bodies], axis=0)
+    extents = high - low
+    if not (np.isfinite(extents).all() and extents.min() > 1e-6):
+        raise InputError(f"the object measures {extents}; expected a solid thing")
+    scale = length / float(extents[("depth", "width", "height").index(side)])
+    everything = np.array([p.mesh.bounds for link in (base, *moving) for p in link.parts])
+    size = scale * (everything[:, 1].max(axis=0) - everything[:, 0].min(axis=0))
+    if size.max() > MAX_SIZE:
+        raise InputError(
+            f"the object would measure {' x '.join(f'{e:.3g}' for e in size)} m with a {side} of "
+            f"{length:g} m; expected a piece of furniture below {MAX_SIZE:g} m"
+        )
+    lowest = min([low[2], *(_lowest(link) for link in moving)])
+    foot = np.array([*_bounds(base)[:, :2].mean(axis=0), lowest])
+    kept, frozen = [], list(base.parts)
+    for link in moving:
+        placed = _scaled(link, scale, foot)
+        assert placed.joint is not None
+        if placed.joint.travel < MIN_TRAVEL[placed.joint.kind]:
+            log.warning("link %r moves by %g only; taken as fixed", link.name, placed.joint.travel)
+            frozen += link.parts
+        else:
+            kept.append(placed)
+    return _scaled(replace(base, parts=tuple(frozen)), scale, foot), kept
+
+
+def moved(part: PartMesh, pose: Float[np.ndarray, "4 4"], scale: float = 1.0) -> PartMesh:
+    """The part under a rigid transform, then scaled about the origin."""
+    surfaces = []
+    for surface in part.surfaces:
+        points = scale * transform(pose, np.asarray(surface.mesh.vertices))
+        mesh = trimesh.Trimesh(points, surface.mesh.faces, process=False)
+        mesh.visual = surface.mesh.visual
+        surfaces.append(Surface(mesh, surface.rgba, surface.texture))
+    return replace(part, surfaces=tuple(surfaces))
+
+
+def _parts(folder: Path, urdf: Urdf, link: str, pose: Float[np.ndarray, "4 4"]) -> list[PartMesh]:
+    surfaces: dict[str, list[Surface]] = {}
+    visuals = urdf.visuals[link]
+    for visual in visuals:
+        path = folder / visual.file
+        if not path.is_file():
+            log.warning("%s: missing; link %r is built without it", path, link)
+            continue
+        key = visual.name or link
+        part = PartMesh(key, key, read_wavefront(path, folder / "images"))
+        if not part.surfaces:
+            log.warning("%s: has no faces; link %r is built without it", path, link)
+            continue
+        surfaces.setdefault(key, []).extend(moved(part, pose @ visual.pose).surfaces)
+    if visuals and not surfaces:
+        raise InputError(f"{folder}: none of the {len(visuals)} meshes of link {link!r} has a face")
+    return [PartMesh(re.sub(r"-\d+$", "", k), k, tuple(s)) for k, s in surfaces.items()]
+
+
+def _mesh_bounds(urdf: Urdf, groups: dict[str, list[PartMesh]]) -> Float[np.ndarray, "2 3"]:
+    """Of all meshes in the frame that they were drawn in, which the joint below the root turns."""
+    top = next((j.pose for j in urdf.joints.values() if j.parent == urdf.root), np.eye(4))
+    meshes = [p.mesh for parts in groups.values() for p in parts]
+    if not meshes:
+        raise InputError("no mesh is there; expected those that the URDF names")
+    points = [transform(np.linalg.inv(top), np.asarray(mesh.vertices)) for mesh in meshes]
+    return np.array([np.min([p.min(axis=0) for p in points], axis=0),
+                     np.max([p.max(axis=0) for p in points], axis=0)])  # fmt: skip
+
+
+def _role(joint: UrdfJoint, semantics: Semantics | None, parts: list[PartMesh]) -> LinkRole:
+    words = " ".join([semantics.name if semantics else "", *(p.name for p in parts)]).lower()
+    if joint.kind == "continuous":
+        return "knob"
+    small = any(word in words for word in ("button", "knob", "switch")) and "door" not in words
+    if joint.kind == "prismatic":
+        return "button" if small else "drawer"
+    if small:
+        return "knob"
+    return "lid" if "lid" in words.split() else "door"
+
+
+def _shut(
+    link: ScanLink, joint: UrdfJoint, frame: Float[np.ndarray, "4 4"], base: ScanLink
+) -> ScanLink:
+    """The link at the limit that is shut, its axis turned so that positive opens.
+
+    Of a door's or a drawer's two limits, the one where link and base share the smaller bounding box is
+    shut; of the others, and where the boxes are alike, the lower one.
+    """
+    kind: Literal["slide", "hinge"] = "slide" if joint.kind == "prismatic" else "hinge"
+    origin, axis = frame[:3, 3], frame[:3, :3] @ joint.axis
+    lower, upper = joint.limits or (0.0, FULL_TURN)
+    start, sign = lower, 1.0
+    if link.role in ("door", "drawer", "lid"):
+        corners = _bounds(base)
+        boxes = []
+        for value in (lower, upper):
+            bounds = _bounds(_turned(link, kind, origin, axis, value))
+            both = np.stack([corners, bounds])
+            boxes.append(float(np.prod(both[:, 1].max(axis=0) - both[:, 0].min(axis=0))))
+        if boxes[1] < 0.999 * boxes[0]:
+            start, sign = upper, -1.0
+    joint_of = LinkJoint(kind, origin, sign * axis, upper - lower)
+    return replace(_turned(link, kind, origin, axis, start), joint=joint_of)
+
+
+def _turned(
+    link: ScanLink,
+    kind: str,
+    origin: Float[np.ndarray, "3"],
+    axis: Float[np.ndarray, "3"],
+    value: float,
+) -> ScanLink:
+    if kind == "slide":
+        pose = compose(np.eye(3), value * axis)
+    else:
+        turn = rotation_about(axis, value)
+        pose = compose(turn, origin - turn @ origin)
+    return replace(link, parts=tuple(moved(p, pose) for p in link.parts))
+
+
+def _lowest(link: ScanLink) -> float:
+    """The lowest height that a link comes to."""
+    joint = link.joint
+    assert joint is not None
+    values = np.linspace(0, joint.travel, 13)
+    return min(
+        float(_bounds(_turned(link, joint.kind, joint.origin, joint.axis, v))[0, 2]) for v in values
+    )
+
+
+def _bounds(link: ScanLink) -> Float[np.ndarray, "2 3"]:
+    bounds = np.array([p.mesh.bounds for p in link.parts])
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
+
+
+def _scaled(link: ScanLink, scale: float, foot: Float[np.ndarray, "3"]) -> ScanLink:
+    pose = compose(np.eye(3), -foot)
+    parts = tuple(moved(p, pose, scale) for p in link.parts)
+    if link.joint is None:
+        return replace(link, parts=parts)
+    joint = link.joint
+    travel = joint.travel * (scale if joint.kind == "slide" else 1.0)
+    origin = scale * (joint.origin - foot)
+    return replace(link, parts=parts, joint=replace(joint, origin=origin, travel=travel))

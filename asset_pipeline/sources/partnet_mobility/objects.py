@@ -1,0 +1,195 @@
+"""PartNet-Mobility as published: folders `<id>/` with `mobility.urdf`, its part meshes and semantics.
+
+Meshes have no unit and y up; the URDF's base joint turns them z up with the front towards -x. An object
+becomes metric by one length of its category (`SIZES`). Doors, drawers, knobs and buttons come out shut;
+a link that hangs on another moving link is taken as fixed to it, and one that floats as fixed where it
+is, each with a warning. https://sapien.ucsd.edu, non-commercial research, no redistribution.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal
+
+from asset_pipeline.sources import collection
+from asset_pipeline.sources.articulated_scan import ArticulatedScan, ScanLink
+from asset_pipeline.sources.partnet_mobility.links import normalised_links, placed_links
+from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_links
+from asset_pipeline.sources.partnet_mobility.urdf import read_urdf
+from asset_pipeline.sources.scan import ScanItem
+from manipose_mj.assets.asset import Provenance
+from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
+
+SOURCE = "PartNet-Mobility v2"
+LICENCE = "PartNet-Mobility terms of use: non-commercial research, no redistribution"
+URDF = "mobility.urdf"
+FILES = (URDF, "mobility_v2.json", "semantics.txt", "meta.json", "bounding_box.json")
+
+
+@dataclass(frozen=True)
+class CategorySize:
+    """How large things of a category are.
+
+    Attributes:
+      category: Our name of it.
+      side: Which side of the bounding box, everything shut and handles left out, is known.
+      length: Of that side [m].
+      appliance: Whether the walls are sheet metal around foam and air; else they are board.
+    """
+
+    category: str
+    side: Literal["depth", "width", "height"]
+    length: float
+    appliance: bool = False
+
+
+# One length each: the one that varies least among things on sale.
+# StorageFurniture: heights and widths vary fivefold, depths do not: IKEA's BESTA cabinets with doors
+# are 42 cm deep, most sideboards and bookcases with doors 35 to 45 cm. Table: EN 527-1 has fixed desk
+# tops at 740 mm. Microwave: counter-top ones are 19 in wide and 10.5 in high (appliance size guides).
+# Oven: free-standing ranges are 30 in wide and 36 in high. Dishwasher, Refrigerator, WashingMachine:
+# the module of kitchens, 24 in or 600 mm (EN 1116), is their width; the fridge is then one that fits
+# under a counter.
+SIZES: dict[str, CategorySize] = {
+    "StorageFurniture": CategorySize("cabinet", "depth", 0.42),
+    "Table": CategorySize("table", "height", 0.74),
+    "Microwave": CategorySize("microwave", "width", 0.48, appliance=True),
+    "Oven": CategorySize("oven", "width", 0.76, appliance=True),
+    "Dishwasher": CategorySize("dishwasher", "width", 0.60, appliance=True),
+    "Refrigerator": CategorySize("refrigerator", "width", 0.60, appliance=True),
+    "WashingMachine": CategorySize("washing_machine", "width", 0.60, appliance=True),
+}
+# What the heavy link is called where `meta.json` does not say the category.
+BODIES = {
+    "microwave_body": "Microwave",
+    "oven_body": "Oven",
+    "dishwasher_body": "Dishwasher",
+    "refrigerator_body": "Refrigerator",
+    "furniture_body": "StorageFurniture",
+}
+
+
+def items(path: Path) -> list[ScanItem]:
+    """The objects at `path`: one object's folder, a folder of them, or of `dataset/`, or an archive.
+
+    Raises:
+      InputError: `path` does not exist or holds no object.
+    """
+    return collection.find_items(
+        path,
+        what="PartNet-Mobility",
+        meshes=(URDF, f"*/{URDF}", f"dataset/*/{URDF}"),
+        name=lambda root, urdf: collection.folder_name(root, urdf.parent),
+        inside=("*.zip",),
+    )
+
+
+def inputs(item: ScanItem) -> dict[str, str]:
+    """The sha256 of every file that the object is built from, keyed by file name."""
+    return collection.hashes(item, _members(item))
+
+
+@contextmanager
+def opened(item: ScanItem) -> Iterator[ArticulatedScan]:
+    """Read one object; its textures stay there as long as the context does.
+
+    Raises:
+      InputError: The archive, the URDF or a mesh cannot be used, or the size of its category is unknown.
+    """
+    with collection.unpacked(item, _members(item)) as folder:
+        try:
+            scan = _scan(item, (folder / item.member).parent)
+        except InputError as error:
+            # The folder of an unpacked archive is gone by the time anyone reads the message.
+            message = str(error).replace(str(folder), str(item.path))
+            named = str(item.path) in message
+            raise InputError(message if named else f"{item.path}: {message}") from None
+        yield scan
+
+
+def _members(item: ScanItem) -> list[PurePosixPath]:
+    folder = PurePosixPath(item.member).parent
+    patterns = [str(folder / name) for name in (*FILES, "textured_objs/*", "images/*")]
+    return [PurePosixPath(member) for member in collection.find(item.path, patterns)]
+
+
+def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:
+    semantics = _semantics(folder)
+    size = _size(folder, semantics)
+    urdf = read_urdf(folder / URDF)
+    compare_links(folder, urdf, semantics)
+    base, moving = placed_links(normalised_links(folder, urdf, semantics), size.side, size.length)
+    return ArticulatedScan(
+        name=item.name,
+        category=size.category,
+        base=base,
+        moving=tuple(_named(moving)),
+        appliance=size.appliance,
+        provenance=Provenance(SOURCE, item.name, LICENCE, inputs(item)),
+    )
+
+
+def _named(moving: list[ScanLink]) -> Iterator[ScanLink]:
+    """Links named for their role and their number in the source: `door_0`, `drawer_12`."""
+    taken: set[str] = set()
+    for index, link in enumerate(moving):
+        number = re.search(r"\d+$", link.name)
+        name = f"{link.role}_{number.group() if number else index}"
+        while name in taken:
+            name += "x"
+        taken.add(name)
+        yield replace(link, name=name)
+
+
+def _semantics(folder: Path) -> dict[str, Semantics]:
+    """What each link is: from `semantics.txt`, else from `mobility_v2.json`, else unknown."""
+    text = folder / "semantics.txt"
+    if text.is_file():
+        content = text.read_text("utf-8", "replace")
+        if not content.endswith("\n"):
+            log.warning("%s: does not end with a newline and may be cut off", text)
+        rows = [line.split() for line in content.splitlines()]
+        if odd := [" ".join(r) for r in rows if len(r) != 3]:
+            log.warning("%s: %r is not link, motion and name; left out", text, odd[0][:60])
+        return {r[0]: Semantics(r[1], r[2]) for r in rows if len(r) == 3}
+    log.warning("%s: missing; links are told apart by mobility_v2.json", text)
+    document = _json(folder / "mobility_v2.json")
+    return {
+        f"link_{e['id']}": Semantics(str(e.get("joint", "")), str(e.get("name", "")))
+        for e in (document if isinstance(document, list) else [])
+        if isinstance(e, dict) and "id" in e
+    }
+
+
+def _size(folder: Path, semantics: dict[str, Semantics]) -> CategorySize:
+    meta = _json(folder / "meta.json")
+    category = meta.get("model_cat") if isinstance(meta, dict) else None
+    if category is None:
+        category = next((BODIES[s.name] for s in semantics.values() if s.name in BODIES), None)
+        log.warning(
+            "%s: does not say the category; by semantics.txt it is %s",
+            folder / "meta.json",
+            category,
+        )
+    if not isinstance(category, str) or category not in SIZES:
+        raise InputError(
+            f"{folder}: category {category!r} has no known size; known: {', '.join(SIZES)}"
+        )
+    return SIZES[category]
+
+
+def _json(path: Path) -> Any:
+    if not path.is_file():
+        return None
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not valid JSON ({error})") from None

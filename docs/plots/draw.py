@@ -1,0 +1,353 @@
+"""Draw the figures of the documentation from the tables beside this file: python docs/plots/draw.py
+
+Each figure is an SVG whose text and lines take the colours of the reader's light or dark scheme.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+
+from manipose_mj.evaluation.statistics import wilson_interval
+from manipose_mj.poses import SymmetryGroup, compose, pose_error, rotation_about
+
+FOLDER = Path(__file__).parent
+# Stand-ins that no other part of a drawing uses, and what the style below replaces them by.
+INK, FAINT, BOX = "#010203", "#040506", "#070809"
+VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", BOX: "var(--box)"}
+STYLE = (
+    "<style>:root{--ink:#1d2125;--faint:#d5d9dd;--box:#eef4f3}"
+    "@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--faint:#434a52;--box:#24313a}}</style>"
+)
+TEAL, ORANGE, VIOLET, GREY, BLUE = "#13907f", "#d9722e", "#8b6fd1", "#8a8f98", "#3d86c6"
+CATEGORIES = ("bowl", "cup", "mug", "box", "hammer", "razor")
+TYPE_COLOURS = {"axial": TEAL, "mirror": ORANGE, "functional": VIOLET}
+
+
+def rows(name: str) -> list[dict[str, str]]:
+    """The lines of a table beside this file, by the names of its columns."""
+    with (FOLDER / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def svg(figure: Figure, name: str) -> str:
+    """The figure as SVG with real text; the same figure gives the same bytes."""
+    stream = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
+    text = stream.getvalue()
+    for colour, variable in VARIABLES.items():
+        text = text.replace(colour, variable)
+    text = text.replace("'DejaVu Sans'", "system-ui, 'DejaVu Sans'")
+    start = text.index("<svg")
+    end = text.index(">", start) + 1
+    return text[start:end] + STYLE + text[end:]
+
+
+def axes_of(figure: Figure, *place: int, grid: str = "y") -> Axes:
+    """Empty axes in the colours of the page."""
+    axes = figure.add_subplot(*place)
+    axes.tick_params(colors=INK, length=3)
+    axes.tick_params(which="minor", length=0, labelcolor=INK)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color(INK)
+    axes.grid(axis=grid, color=FAINT, linewidth=0.8)  # pyright: ignore[reportArgumentType]
+    axes.set_axisbelow(True)
+    for text in (axes.title, axes.xaxis.label, axes.yaxis.label):
+        text.set_color(INK)
+    return axes
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of so many inches."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def legend(axes: Axes, **options: object) -> None:
+    """The legend without a frame, in the page's ink."""
+    axes.legend(frameon=False, labelcolor=INK, **options)  # pyright: ignore[reportArgumentType]
+
+
+def protocol_v1() -> Figure:
+    """Success of the baseline on every task, with Wilson's interval."""
+    table = sorted(rows("protocol_v1"), key=lambda r: r["task"], reverse=True)
+    figure = new_figure(7.2, 7.6)
+    axes = axes_of(figure, grid="x")
+    for y, row in enumerate(table):
+        won, of = int(row["successes"]), int(row["episodes"])
+        low, high = wilson_interval(won, of)
+        axes.barh(y, 100 * won / of, color=TEAL, height=0.62)
+        axes.plot([100 * low, 100 * high], [y, y], color=INK, linewidth=1.4)
+    axes.set_yticks(range(len(table)), [row["task"] for row in table], fontsize=8.5)
+    axes.set_xlim(0, 100)
+    axes.set_ylim(-0.7, len(table) - 0.3)
+    axes.set_xlabel("success at end [%], line: Wilson 95 % interval")
+    return figure
+
+
+def pose_methods() -> Figure:
+    """Mean orientation and origin errors of all methods on unified labels."""
+    methods = (
+        ("ours", TEAL, "o"),
+        ("paper", BLUE, "s"),
+        ("CPPF as published", ORANGE, "^"),
+        ("multi-start ICP", GREY, "D"),
+    )
+    figure = new_figure(7.2, 3.5)
+    for place, column, label in (
+        (1, "rotation_mean_deg", "mean orientation error [deg]"),
+        (2, "origin_mean_cm", "mean origin error [cm]"),
+    ):
+        axes = axes_of(figure, 1, 2, place)
+        for shift, (method, colour, marker) in enumerate(methods):
+            values = _by_category(method, "unified", column)
+            x = np.arange(len(CATEGORIES)) + 0.14 * (shift - 1.5)
+            axes.plot(x, values, marker, color=colour, label=method)
+        axes.set_yscale("log")
+        axes.set_xticks(range(len(CATEGORIES)), CATEGORIES)
+        axes.set_ylabel(label)
+        axes.yaxis.set_major_formatter("{x:g}")
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles, names, loc="outside lower center", ncols=4, frameon=False, labelcolor=INK
+    )
+    return figure
+
+
+def original_labels() -> Figure:
+    """What original labels cost, for ours and for CPPF."""
+    figure = new_figure(7.2, 3.2)
+    for place, method in ((1, "ours"), (2, "CPPF as published")):
+        axes = axes_of(figure, 1, 2, place)
+        x = np.arange(len(CATEGORIES))
+        for shift, labels, colour in ((-0.19, "unified", TEAL), (0.19, "original", ORANGE)):
+            values = _by_category(method, labels, "rotation_mean_deg")
+            axes.bar(x + shift, values, width=0.36, color=colour, label=f"{labels} labels")
+        axes.set_xticks(x, CATEGORIES)
+        axes.set_ylim(0, 105)
+        axes.set_title(method, fontsize=10)
+        axes.set_ylabel("mean orientation error [deg]")
+    legend(figure.axes[0], loc="upper left")
+    return figure
+
+
+def types() -> Figure:
+    """Median orientation error of the networks of whole types, a row for each category."""
+    table = sorted(
+        rows("types"), key=lambda r: (r["type"], float(r["rotation_median_deg"])), reverse=True
+    )
+    figure = new_figure(7.2, 9.4)
+    axes = axes_of(figure, grid="x")
+    for y, row in enumerate(table):
+        value, flipped = float(row["rotation_median_deg"]), int(row["flipped_percent"])
+        axes.plot([0.15, value], [y, y], color=FAINT, linewidth=1.2)
+        axes.plot(value, y, "o", color=TYPE_COLOURS[row["type"]], markersize=6)
+        if flipped >= 5:
+            axes.text(value * 1.13, y, f"{flipped} % flipped", va="center", color=INK, fontsize=8)
+    axes.set_xscale("log")
+    axes.set_xlim(0.15, 40)
+    axes.set_ylim(-0.8, len(table) - 0.2)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_yticks(range(len(table)), [row["category"] for row in table], fontsize=8)
+    axes.set_xlabel("median orientation error [deg]")
+    for name, colour in TYPE_COLOURS.items():
+        axes.plot([], [], "o", color=colour, label=name)
+    legend(axes, loc="upper right")
+    return figure
+
+
+def unseen_categories() -> Figure:
+    """Seen and unseen: medians of categories left out of training beside those with training on them."""
+    seen = {row["category"]: float(row["rotation_median_deg"]) for row in rows("types")}
+    figure = new_figure(5.2, 4.2)
+    axes = axes_of(figure, grid="both")
+    axes.plot([0.1, 200], [0.1, 200], color=FAINT, linewidth=1.4)
+    for row in rows("unseen_categories"):
+        x, y = seen[row["category"]], float(row["rotation_median_deg"])
+        axes.plot(x, y, "o", color=TYPE_COLOURS[row["type"]])
+        beside = row["category"] in {"drinkbox", "remote", "chips can", "pear"}
+        axes.annotate(
+            row["category"],
+            (x, y),
+            xytext=(-5 if beside else 5, 3),
+            ha="right" if beside else "left",
+            textcoords="offset points",
+            color=INK,
+            fontsize=8,
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(0.12, 9)
+    axes.set_ylim(0.12, 260)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.set_xlabel("median error with the category in training [deg]")
+    axes.set_ylabel("median error without it [deg]")
+    for name, colour in TYPE_COLOURS.items():
+        axes.plot([], [], "o", color=colour, label=name)
+    legend(axes, loc="lower right")
+    return figure
+
+
+def corrupted_clouds() -> Figure:
+    """Median orientation error with outliers and with parts of the cloud hidden."""
+    figure = new_figure(7.2, 3.0)
+    for place, corruption, label in (
+        (1, "outliers", "points that are outliers [%]"),
+        (2, "occlusion", "points hidden [%]"),
+    ):
+        axes = axes_of(figure, 1, 2, place)
+        for category, colour in (("cup", TEAL), ("box", ORANGE)):
+            own = [
+                (float(r["percent"]), float(r["rotation_median_deg"]))
+                for r in rows("corrupted_clouds")
+                if (r["category"], r["corruption"]) == (category, corruption)
+            ]
+            axes.plot(*np.array(own).T, "o-", color=colour, label=category)
+        axes.set_yscale("log")
+        axes.set_ylim(0.3, 120)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_xlabel(label)
+        axes.set_ylabel("median orientation error [deg]")
+    legend(figure.axes[0], loc="upper left")
+    return figure
+
+
+def furniture() -> Figure:
+    """Shares of handles and joints found and right, on the catalogue and on PartNet-Mobility."""
+    measures = ("found", "centre", "axes", "joint", "all")
+    figure = new_figure(7.2, 3.2)
+    axes = axes_of(figure)
+    for shift, row in enumerate(rows("furniture")):
+        colour = TEAL if row["objects"] == "catalogue" else ORANGE
+        x = np.arange(len(measures)) + 0.2 * (shift - 1.5)
+        label = f"{row['objects']}, {row['views']} view{'s' if row['views'] != '1' else ''}"
+        axes.bar(
+            x,
+            [float(row[m]) for m in measures],
+            width=0.18,
+            color=colour,
+            alpha=1.0 if row["views"] == "1" else 0.6,
+            label=label,
+        )
+    axes.set_xticks(range(len(measures)), measures)
+    axes.set_ylim(0, 100)
+    axes.set_ylabel("share of visible handles [%]")
+    axes.legend(
+        frameon=False, labelcolor=INK, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
+    return figure
+
+
+def symmetry() -> Figure:
+    """The rotation error that remains after a turn about X, for each symmetry group."""
+    x_axis = np.array([1.0, 0.0, 0.0])
+    quarter = SymmetryGroup.generated(rotation_about(x_axis, np.pi / 2)[None])
+    groups = (
+        ("none (mug)", SymmetryGroup.identity(), ORANGE),
+        ("half turn (pot)", SymmetryGroup.two_planes(), VIOLET),
+        ("quarter turns (square box)", quarter, BLUE),
+        ("axis (bowl)", SymmetryGroup.about_x(), TEAL),
+    )
+    turns = np.linspace(0, 360, 361)
+    figure = new_figure(7.2, 3.0)
+    axes = axes_of(figure)
+    for name, group, colour in groups:
+        poses = [compose(rotation_about(x_axis, np.deg2rad(t)), np.zeros(3)) for t in turns]
+        errors = [float(pose_error(pose, np.eye(4), group)[1]) for pose in poses]
+        axes.plot(turns, np.rad2deg(errors), color=colour, label=name, linewidth=2)
+    axes.set_xticks(range(0, 361, 90))
+    axes.set_yticks(range(0, 181, 45))
+    axes.set_xlim(0, 360)
+    axes.set_xlabel("turn of the object about its X [deg]")
+    axes.set_ylabel("rotation error [deg]")
+    legend(axes, loc="upper left", fontsize=9)
+    return figure
+
+
+def protocol() -> Figure:
+    """From a frozen seed to an episode's verdict."""
+    boxes = (
+        ("protocol v1", "100 seeds per task\ntest objects"),
+        ("episode start", "objects, poses, goals\nfrom one seed"),
+        ("policy", "observations in,\nactions out"),
+        ("verdict", "success at end, once\nor a failure's stage"),
+        ("report", "rate, Wilson interval,\npictures"),
+    )
+    figure = new_figure(7.2, 1.25)
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.set_xlim(0, 5)
+    axes.set_ylim(0, 1)
+    for column, (title, text) in enumerate(boxes):
+        box = FancyBboxPatch(
+            (column + 0.04, 0.1),
+            0.8,
+            0.8,
+            boxstyle="round,pad=0,rounding_size=0.06",
+            fc=BOX,
+            ec=TEAL,
+        )
+        axes.add_patch(box)
+        axes.text(
+            column + 0.44,
+            0.72,
+            title,
+            ha="center",
+            va="center",
+            color=INK,
+            weight="bold",
+            fontsize=9,
+        )
+        axes.text(column + 0.44, 0.38, text, ha="center", va="center", color=INK, fontsize=7)
+        if column:
+            axes.annotate(
+                "",
+                (column + 0.03, 0.5),
+                (column - 0.15, 0.5),
+                arrowprops={"arrowstyle": "->", "color": INK},
+            )
+    return figure
+
+
+FIGURES = (
+    protocol_v1,
+    pose_methods,
+    original_labels,
+    types,
+    unseen_categories,
+    corrupted_clouds,
+    furniture,
+    symmetry,
+    protocol,
+)
+
+
+def _by_category(method: str, labels: str, column: str) -> list[float]:
+    chosen = {
+        row["category"]: float(row[column])
+        for row in rows("pose_methods")
+        if (row["method"], row["labels"]) == (method, labels)
+    }
+    return [chosen[category] for category in CATEGORIES]
+
+
+def main(folder: Path = FOLDER, only: Iterable[str] = ()) -> None:
+    """Write the figures into a folder."""
+    for figure in FIGURES:
+        name = figure.__name__
+        if not only or name in only:
+            (folder / f"{name}.svg").write_text(svg(figure(), name), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

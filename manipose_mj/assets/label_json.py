@@ -1,0 +1,76 @@
+"""A pose label, and how sure it is, as `asset.json` holds them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from manipose_mj.assets.json_fields import Fields, rounded
+from manipose_mj.assets.label import (
+    OBJECT_TYPES,
+    PoseLabel,
+    symmetry_from_bop,
+    symmetry_to_bop,
+)
+from manipose_mj.assets.label_quality import LabelQuality
+from manipose_mj.errors import InputError
+
+
+def label_to_json(label: PoseLabel) -> dict[str, Any]:
+    """What `asset.json` says of a label, of an object or a handle."""
+    return {
+        "object_type": label.object_type,
+        "origin": rounded(label.origin),
+        "rotation": rounded(label.rotation),
+        "extents": rounded(label.extents),
+        **symmetry_to_bop(label),
+    }
+
+
+def read_label(fields: Fields) -> PoseLabel:
+    """The label that a part of a document says.
+
+    Raises:
+      InputError: A field is missing or wrong.
+    """
+    rotation = fields.array("rotation", 3, 3)
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
+        raise fields.wrong("rotation", "a right-handed rotation matrix")
+    discrete = fields.entries("symmetries_discrete")
+    continuous = fields.entries("symmetries_continuous")
+    try:
+        symmetry = symmetry_from_bop(rotation, discrete, continuous)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{fields.path}: field '{fields.name}.symmetries_*' is wrong: {error}"
+        ) from None
+    return PoseLabel(
+        origin=fields.array("origin", 3),
+        rotation=rotation,
+        object_type=fields.text("object_type", *OBJECT_TYPES),
+        extents=fields.lengths("extents"),
+        symmetry=symmetry,
+    )
+
+
+def quality_to_json(quality: LabelQuality | None) -> dict[str, Any] | None:
+    """What `asset.json` says of how sure a label is."""
+    if quality is None:
+        return None
+    residuals = {name: round(float(value), 9) for name, value in quality.residuals.items()}
+    return {"confidence": round(quality.confidence, 6), "residuals": residuals}
+
+
+def read_quality(fields: Fields | None) -> LabelQuality | None:
+    """How sure the label is; None where nothing is said.
+
+    Raises:
+      InputError: A field is missing or wrong.
+    """
+    if fields is None:
+        return None
+    residuals = fields.fields("residuals")
+    return LabelQuality(
+        fields.number("confidence", 0, 1), {key: residuals.number(key) for key in residuals.values}
+    )

@@ -1,0 +1,1 @@
+"""The commands `manipose pose ...`: train, evaluate and average estimators, render clouds."""

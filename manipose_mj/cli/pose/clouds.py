@@ -1,0 +1,103 @@
+"""The clouds that the pose commands work on, rendered with progress on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from manipose_mj.assets.categories import CATALOGUE, Split
+from manipose_mj.console import output
+from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.ppf_jax.data.part_swap_clouds import part_swap_clouds
+from manipose_mj.ppf_jax.data.source_frames import SourceLabel, with_source_frames
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
+from manipose_mj.ppf_jax.data.view_settings import view_setting
+from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+
+
+class PoseClouds:
+    """Views of a category's, or a type's, objects."""
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        leave_out: Sequence[str] = (),
+        labels: Literal["unified", "original"] = "unified",
+        jobs: int = 1,
+    ) -> None:
+        """Choose the categories.
+
+        Args:
+          name: A category or a type.
+          leave_out: Categories of the type to do without.
+          labels: The unified ones, or those of the sources that objects are assigned to.
+          jobs: Processes that render.
+
+        Raises:
+          InputError: There is no such category or type, or nothing is left.
+        """
+        known = categories_of(name)
+        for category in leave_out:
+            if category not in known:
+                raise unknown_name(f"category of {name}", category, known)
+        self.categories = tuple(c for c in known if c not in leave_out)
+        if not self.categories:
+            raise InputError(f"--leave-out leaves nothing of {name}")
+        self._labels = labels
+        self._jobs = jobs
+
+    def objects(self, split: Split) -> int:
+        """How many objects are in a split."""
+        rows = [CATALOGUE[category] for category in self.categories]
+        return sum(row.split(i) == split for row in rows for i in range(row.instances))
+
+    def rendered(self, split: Split, setting: str, views: int) -> list[LabelledCloud]:
+        """Views of every object in a split."""
+        clouds: list[LabelledCloud] = []
+        total, before = self.objects(split), 0
+        chosen = view_setting(setting)
+        with output.Progress(f"{split} objects rendered") as progress:
+
+            def show(done: int, _: int, name: str) -> None:
+                progress.update(before + done, total, name)
+
+            for category in self.categories:
+                clouds += catalogue_clouds(
+                    category, split, chosen, views=views, jobs=self._jobs, progress=show
+                )
+                before += self._objects_of(category, split)
+        if self._labels == "original":
+            return with_source_frames(clouds, self.sources(clouds))
+        return clouds
+
+    def part_swapped(self, count: int) -> list[LabelledCloud]:
+        """Views of objects that are made of two training objects each, as training sees them.
+
+        Raises:
+          InputError: They are wanted with the sources' labels, which they have none of; or of fewer
+            than two categories.
+        """
+        if not count:
+            return []
+        if self._labels == "original":
+            raise InputError(
+                "--part-swaps makes objects that no source has; leave out --labels original"
+            )
+        with output.Progress("part-swapped objects rendered") as progress:
+            return part_swap_clouds(
+                self.categories,
+                count,
+                view_setting("training"),
+                jobs=self._jobs,
+                progress=progress.update,
+            )
+
+    def sources(self, clouds: Sequence[LabelledCloud]) -> dict[str, SourceLabel]:
+        """The sources' labels of the objects that clouds show."""
+        return source_labels(clouds, jobs=self._jobs)
+
+    def _objects_of(self, category: str, split: Split) -> int:
+        row = CATALOGUE[category]
+        return sum(row.split(i) == split for i in range(row.instances))

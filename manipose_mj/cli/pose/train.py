@@ -1,0 +1,136 @@
+"""`manipose pose train`: an estimator for a category, or for all categories of a type."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from manipose_mj.console.process import CORES, compile_at_once_on_gpus, one_thread_per_process
+from manipose_mj.errors import InputError
+
+WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
+HELD_OUT = "anywhere"  # the setting that the curve's errors are of, as the tables are
+Name = Annotated[Positional[str], arg(metavar="CATEGORY|TYPE")]
+
+
+def train_pose(
+    name: Name,
+    /,
+    *,
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    leave_out: Annotated[tuple[str, ...], arg(metavar="CATEGORY...")] = (),
+    method: Literal["ours", "cppf"] = "ours",
+    labels: Literal["unified", "original"] = "unified",
+    setting: Annotated[tuple[str, ...], arg(metavar="NAME...")] = ("training",),
+    views: int = 256,
+    part_swaps: int = 0,
+    batch: int = 64,
+    steps: int = 20_000,
+    minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
+    seed: int = 0,
+    start_from: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    jobs: int = CORES,
+) -> int:
+    """Train a pose estimator on rendered views of the catalogue's training objects.
+
+    Goes on where an interrupted training of the same folder was. Writes the weights, the state to go on
+    from, and the curve as JSON and as a picture.
+
+    Args:
+      name: A category, such as mug; or a type, axial, mirror or functional: one network for all of
+        its categories.
+      out: Folder to write to; without it pose/NAME, or pose/NAME-cppf, pose/NAME-original,
+        pose/NAME-cppf-original.
+      leave_out: Categories of the type that are not trained on.
+      method: Our estimator, or CPPF as published, to compare with; for the latter --batch 8 is enough
+        on a CPU.
+      labels: The unified labels, or those of the sources that the objects are assigned to.
+      setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
+      views: Of each object in each setting.
+      part_swaps: Of a type, so many objects besides that are made of two of different categories, 32 views
+        each in the setting training.
+      batch: Clouds in a step.
+      steps: In all.
+      minutes: Ends the training, cooled down, if the steps do not.
+      seed: Of the first weights and of all that training draws.
+      start_from: Weights of an earlier training to start from, instead of random ones.
+      jobs: Processes that render.
+    """
+    one_thread_per_process()
+    compile_at_once_on_gpus()
+    require_positive(minutes, views=views, batch=batch, steps=steps)
+    if part_swaps < 0:
+        raise InputError(f"--part-swaps is {part_swaps}; expected 0 or more")
+    if not setting:
+        raise InputError("--setting names none; expected at least one, such as training")
+    from manipose_mj.cli.pose.clouds import PoseClouds
+    from manipose_mj.console import output
+    from manipose_mj.ppf_jax.data.view_cache import batch_stream
+    from manipose_mj.ppf_jax.training.curve_picture import draw_curve
+    from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, train
+    from manipose_mj.ppf_jax.training.methods import METHODS
+    from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
+
+    source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
+    made_of_two = source.part_swapped(part_swaps)
+    clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
+    clouds += made_of_two
+    chosen = METHODS[method]
+    # For the curve; nothing is chosen by them.
+    checks = -(-chosen.checks // batch)
+    held_out = source.rendered("test", HELD_OUT, 1 + checks * batch // source.objects("test"))
+    config = chosen.configured(clouds)
+    stream = batch_stream(held_out, batch, seed, points=config.points)(0)
+    feed = batch_stream(clouds, batch, seed, points=config.points)
+    folder = Path("pose") / folder_name(name, method, labels) if out is None else out
+    with output.Progress("steps") as progress:
+
+        def show(row: Row) -> None:
+            error = f", {row['deg_median']:.1f} deg" if "deg_median" in row else ""
+            progress.update(int(row["step"]) + 1, steps, f"loss {row['loss']:.3f}{error}")
+
+        model = train(
+            feed,
+            config,
+            replace(chosen.training, steps=steps, seed=seed),
+            folder,
+            build=chosen.build,
+            initial=None if start_from is None else load_weights(start_from).model,
+            held_out=[next(stream) for _ in range(checks)],
+            minutes=minutes,
+            progress=show,
+        )
+    if chosen.tuned is not None:
+        model = chosen.tuned(model, list(islice(feed(0), checks)))
+    save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels))
+    draw_curve(folder / CURVE_FILE, folder / CURVE_PICTURE)
+    output.standard_output().print(
+        f"trained on {len(clouds)} views of {', '.join(source.categories)}; {folder / WEIGHTS_FILE}",
+        soft_wrap=True,
+    )
+    return 0
+
+
+def folder_name(name: str, method: str, labels: str) -> str:
+    """Where a training is kept if its user does not say."""
+    parts = [name]
+    parts += [method] if method != "ours" else []
+    parts += [labels] if labels != "unified" else []
+    return "-".join(parts)
+
+
+def require_positive(minutes: float | None, **counts: int) -> None:
+    """Refuse a training of no length.
+
+    Raises:
+      InputError: An option, named as it is on the command line, is less than 1, or `minutes` not positive.
+    """
+    for option, value in counts.items():
+        if value < 1:
+            raise InputError(f"--{option} is {value}; expected at least 1")
+    if minutes is not None and not minutes > 0:
+        raise InputError(f"--minutes is {minutes:g}; expected more than 0")

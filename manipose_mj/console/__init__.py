@@ -1,0 +1,1 @@
+"""Terminal output and the set-up of worker processes."""

@@ -1,0 +1,1 @@
+"""Recorded trajectories converted from one control mode to another."""

@@ -1,0 +1,1 @@
+"""Plans carried out on the robot, and recovery where a step fails."""

@@ -1,0 +1,285 @@
+"""The three primitives: `grasp_at`, `move_to`, `release`. Everything is held by friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.execution.executor import Actions, Executor
+from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.part_pick import (
+    MIN_SHARE,
+    ending_free,
+    off_surface,
+    push_part,
+    share_of,
+    way_in_hand,
+)
+from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
+from manipose_mj.control.grasping.retraction import (
+    Place,
+    find_place,
+    retractions,
+    transport_path,
+)
+from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.plan import Step
+from manipose_mj.control.scene.cavity_mouth import way_out
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
+from manipose_mj.failures import StageFailure
+from manipose_mj.mjcf.panda.robot import MAX_OPENING
+from manipose_mj.poses import invert, rotation_angle
+
+# Past this the object in the hand is not where the grasp put it.
+_LOST_DISTANCE = 0.04
+_LOST_ANGLE = 0.6
+# How much slip in the hand calls for a new descent, and how much forbids the old one [m, rad].
+_SLIP = (0.002, 0.02)
+_BIG_SLIP = (0.01, 0.08)
+# Of a part's joint from where it should have gone, as a share of its range.
+_OPENING_TOLERANCE = 0.12
+_PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
+_SETTLE = 0.25  # after letting go [s]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Attributes: name; pick: how it was taken; pose_tcp: `T_tcp_label` then (of a handle, for a part)."""
+
+    name: str
+    pick: ObjectPick | PartPick
+    pose_tcp: Float[np.ndarray, "4 4"]
+
+
+class Primitives:
+    """Executes plan steps; each is a generator of actions and plans on what it observes.
+
+    The planner that a primitive takes says what to assume; it plans in the scene of every new
+    observation. Raises `StageFailure` where a step cannot be done.
+    """
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._held: _Held | None = None
+
+    @property
+    def held(self) -> str | None:
+        """What is held."""
+        return None if self._held is None else self._held.name
+
+    def grasp_at(self, planner: MotionPlanner, name: str, destination: Step | None) -> Actions:
+        """Take hold of an object, or of a part's handle, in a way that allows the next `move_to`."""
+        estimate, planner = self._observe(planner)
+        if name in estimate.parts:
+            opening = None if destination is None else destination.opening
+            pick = pick_part(planner, estimate, estimate.parts[name], opening)
+        else:
+            poses = () if destination is None else destination.poses
+            pick = pick_object(planner, estimate, estimate.objects[name], poses)
+        yield from self._executor.open_to(pick.opening)
+        yield from self._executor.follow(pick.free_path)
+        yield from self._executor.follow(pick.approach)
+        yield from self._executor.close()
+        estimate = self._executor.observe()
+        if estimate.opening < min(0.5 * pick.width, pick.width - 0.004):
+            yield from self._let_go(planner, name)
+            raise StageFailure("grasp", f"the gripper closed past {name}")
+        self._executor.hold(name)
+        self._held = _Held(name, pick, _pose_in_hand(estimate, name))
+
+    def move_to(self, planner: MotionPlanner, step: Step) -> Actions:
+        """Bring what is held to its destination."""
+        if self._held is None and step.opening is not None:
+            yield from self._push_part(planner, step.subject, step.opening)
+        elif self._held is None:
+            raise StageFailure("plan", f"move_to {step.subject} while nothing is held")
+        elif isinstance(self._held.pick, PartPick):
+            yield from self._move_part(planner, step)
+        else:
+            yield from self._move_object(planner, step, self._held.pick)
+
+    def release(self, planner: MotionPlanner, name: str) -> Actions:
+        """Let go and back off along the approach."""
+        held, self._held = self._held, None
+        if held is None:
+            raise StageFailure("plan", f"release {name} while nothing is held")
+        yield from self._let_go(planner, name)
+
+    def _observe(self, planner: MotionPlanner) -> tuple[SceneEstimate, MotionPlanner]:
+        """A new estimate, and the planner in its scene."""
+        estimate = self._executor.observe()
+        return estimate, planner.within(estimate.scene)
+
+    def _let_go(self, planner: MotionPlanner, name: str) -> Actions:
+        estimate = self._executor.observe()
+        opening = min(estimate.opening + OPENING_MARGIN, MAX_OPENING)
+        yield from self._executor.open_to(opening)
+        yield from self._executor.wait(_SETTLE)
+        self._executor.hold(None)
+        estimate, planner = self._observe(planner)
+        yield from self._executor.follow(_retreat(planner, estimate, name))
+
+    def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
+        name = step.subject
+        estimate, planner = self._observe(planner)
+        yield from self._executor.follow(retraction_of(planner, estimate, name))
+        # Things turn a little in the hand when their weight comes on it: measure, then plan.
+        estimate, planner = self._observe(planner)
+        pose_tcp = self._check_held(estimate, name)
+        place = _place(planner, estimate, step, pose_tcp, pick.goal)
+        if place is None:
+            raise StageFailure("plan", f"no way to set {name} down where it should go")
+        attached = estimate.in_hand(name)
+        free = transport_path(planner, estimate.joints, place.above, attached)
+        if free is None:
+            raise StageFailure("plan", f"no path for {name} to where it should go")
+        yield from self._executor.follow(free)
+        estimate, planner = self._observe(planner)
+        now = self._check_held(estimate, name)
+        if _moved(pose_tcp, now, _SLIP):
+            again = _placed_again(planner, estimate, step, now)
+            if again is not None:
+                free, place = again
+                yield from self._executor.follow(free)
+            elif _moved(pose_tcp, now, _BIG_SLIP):
+                raise StageFailure("plan", f"{name} slipped, no way to set it down as it is now")
+        yield from self._executor.follow(place.descent)
+
+    def _move_part(self, planner: MotionPlanner, step: Step) -> Actions:
+        """As far as the hand on the handle can lead it: a push may do the rest."""
+        assert step.opening is not None
+        estimate, planner = self._observe(planner)
+        part = estimate.parts[step.subject]
+        self._check_held(estimate, step.subject)
+        way = way_in_hand(planner, estimate, part, step.opening)
+        way = None if way is None else ending_free(planner, part, way)
+        if way is None or share_of(way, part, step.opening) < MIN_SHARE[part.joint.kind]:
+            raise StageFailure("plan", f"the arm cannot carry {part.name} far by its handle")
+        yield from self._executor.follow(way.targets(self._executor.timestep))
+        moved = self._executor.observe().parts[part.name].opening
+        low, high = part.joint.range
+        if abs(moved - way.openings[-1]) > _OPENING_TOLERANCE * (high - low):
+            raise StageFailure(
+                "motion",
+                f"{part.name} is at {moved:.3f}, the hand should have it at {way.openings[-1]:.3f}",
+            )
+
+    def _push_part(self, planner: MotionPlanner, name: str, opening: float) -> Actions:
+        """With closed fingers; nothing to do where the part is there already."""
+        part = self._executor.observe().parts[name]
+        low, high = part.joint.range
+        if abs(part.opening - opening) < _PUSH_TOLERANCE * (high - low):
+            return
+        yield from self._executor.close()
+        estimate, planner = self._observe(planner)
+        push = push_part(planner, estimate, estimate.parts[name], opening)
+        yield from self._executor.follow(push.free_path)
+        yield from self._executor.follow(push.approach)
+        yield from self._executor.follow(push.way.targets(self._executor.timestep))
+        estimate, planner = self._observe(planner)
+        back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
+        if back is not None:
+            yield from self._executor.follow(back)
+        moved = estimate.parts[name].opening
+        if abs(moved - opening) > _OPENING_TOLERANCE * (high - low):
+            raise StageFailure("motion", f"{name} is at {moved:.3f}, should be at {opening:.3f}")
+
+    def _check_held(self, estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
+        """`T_tcp_label` now.
+
+        Raises:
+          StageFailure: It is no longer where the grasp had it.
+        """
+        assert self._held is not None
+        now, then = _pose_in_hand(estimate, name), self._held.pose_tcp
+        moved = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
+        turned = float(rotation_angle(now[:3, :3], then[:3, :3]))
+        # A handle may slide along its bar and turn about it; what counts there is the joint.
+        is_part = name in estimate.parts
+        if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
+            raise StageFailure(
+                "grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand"
+            )
+        return now
+
+
+def retraction_of(
+    planner: MotionPlanner, estimate: SceneEstimate, name: str
+) -> Float[np.ndarray, "t 7"]:
+    """Joint targets that lift a held object off its support.
+
+    Raises:
+      StageFailure: There is no way.
+    """
+    way = way_out(estimate, estimate.objects[name].label_pose[:3, 3])
+    for retraction in retractions(planner, estimate.joints, estimate.in_hand(name), way):
+        return retraction
+    raise StageFailure("plan", f"no way to lift {name}")
+
+
+def _retreat(
+    planner: MotionPlanner, estimate: SceneEstimate, name: str
+) -> Float[np.ndarray, "t 7"]:
+    """Joint targets back off from what was let go.
+
+    Raises:
+      StageFailure: There is no way.
+    """
+    released = estimate.parts.get(name) or estimate.objects[name]
+    line = retreat(
+        planner,
+        estimate,
+        released.geoms,
+        frozenset({planner.body_name(released.body)}),
+        HANDLE_RETREATS if name in estimate.parts else RETREATS,
+    )
+    if line is None:
+        raise StageFailure("release", f"no way to back off from {name}")
+    return line
+
+
+def _place(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    step: Step,
+    pose_tcp: Float[np.ndarray, "4 4"],
+    near: Float[np.ndarray, "7"],
+) -> Place | None:
+    """How to set down what is held at `T_tcp_label`, near a configuration [rad]."""
+    symmetry = estimate.objects[step.subject].label.symmetry
+    way = way_out(estimate, step.poses[0][:3, 3])
+    attached = estimate.in_hand(step.subject)
+    return find_place(planner, pose_tcp, step.poses, symmetry, attached, near, way)
+
+
+def _placed_again(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    step: Step,
+    pose_tcp: Float[np.ndarray, "4 4"],
+) -> tuple[Float[np.ndarray, "t 7"], Place] | None:
+    """A short path and a descent for the object as it lies in the hand now."""
+    place = _place(planner, estimate, step, pose_tcp, estimate.joints)
+    if place is None:
+        return None
+    query = estimate.in_hand(step.subject).query()
+    free = planner.free_path(estimate.joints, place.above, query)
+    return None if free is None else (free, place)
+
+
+def _pose_in_hand(estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
+    """`T_tcp_label` of an object, or of a part's handle."""
+    part: PartEstimate | None = estimate.parts.get(name)
+    pose = estimate.objects[name].label_pose if part is None else part.handle_pose
+    return invert(estimate.tcp_pose) @ pose
+
+
+def _moved(
+    a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"], limit: tuple[float, float]
+) -> bool:
+    """Whether an object has slipped in the hand by more than a distance [m] or an angle [rad]."""
+    shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
+    return shift > limit[0] or float(rotation_angle(a[:3, :3], b[:3, :3])) > limit[1]

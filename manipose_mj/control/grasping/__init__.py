@@ -1,0 +1,1 @@
+"""Grasps of objects and handles with the motions that reach them."""

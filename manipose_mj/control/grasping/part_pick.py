@@ -1,0 +1,230 @@
+"""Taking a door by its handle, and pushing a drawer or door, so that it can be moved all the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.handle_grasps import (
+    Push,
+    grip_now,
+    grips,
+    opening_pushes,
+    shifted,
+    shutting_pushes,
+)
+from manipose_mj.control.grasping.part_motion import PartWay, find_way
+from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.articulation import joint_motion, with_part_at
+from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
+from manipose_mj.failures import StageFailure
+from manipose_mj.mjcf.panda.robot import MAX_OPENING
+
+_STANDOFFS = (0.10, 0.07, 0.05)  # from which a handle is approached [m]
+# From which a surface is approached: off it, and back along the hand [m].
+_PUSH_STANDOFFS = ((0.05, 0.0), (0.03, 0.0), (0.02, 0.12), (0.02, 0.07))
+_APPROACH = replace(CONTACT, arm=0.002, target=0.0)
+# A grip that moves a part by less than this share of what is asked is of no use; a door is pushed
+# the rest of the way.
+MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
+_STEP_BACK = 6  # poses of a way
+_MAX_TRIES = 12  # complete ways for which an approach is looked for
+
+
+@dataclass(frozen=True)
+class HandleGrip:
+    """How to take a handle: joint targets to where the approach starts, and along it; the
+    gripper's opening on approach, and its expected one once closed [m]."""
+
+    free_path: Float[np.ndarray, "t 7"]
+    approach: Float[np.ndarray, "s 7"]
+    opening: float
+    width: float
+
+
+@dataclass(frozen=True)
+class PartPush:
+    """How to push a part: joint targets to where the approach starts, along it and of the push
+    itself `(t, 7)`; way: what the push does."""
+
+    free_path: Float[np.ndarray, "t 7"]
+    approach: Float[np.ndarray, "s 7"]
+    way: PartWay
+
+
+def grip_handle(
+    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float | None
+) -> HandleGrip:
+    """A grip of the handle that can be approached and moves the part as far as any, and get off there.
+
+    Args:
+      planner: Plans in the scene of the estimate.
+      estimate: What is where.
+      part: What to take.
+      opening: Where it shall go [m or rad]; None: nobody knows yet.
+
+    Raises:
+      StageFailure: None moves it by a fair share of the way.
+    """
+    least = MIN_SHARE[part.joint.kind]
+    if opening is None:
+        least, (low, high) = 0.0, part.joint.range
+        opening = high if part.opening - low < high - part.opening else low
+    ways = [
+        way
+        for hold in grips(part)
+        if (way := find_way(planner, part, hold, opening, near=estimate.joints)) is not None
+        and share_of(way, part, opening) >= least
+        and _can_get_off(planner, part, way)
+    ]
+    ways.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
+    # At low handles the wrist is within millimetres of the table: only if nothing else will do.
+    for tight in (False, True):
+        for way in ways[:_MAX_TRIES]:
+            wide = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
+            approach = _backwards(planner, part, way.joints[0], wide, _STANDOFFS)
+            if approach is None:
+                continue
+            free_path = planner.free_path(
+                estimate.joints, approach[0], CollisionQuery(opening=wide), tight=tight
+            )
+            if free_path is not None:
+                return HandleGrip(free_path, approach, wide, way.hold.opening)
+    raise StageFailure(
+        "plan",
+        f"no grip of {part.name}'s handle works: {len(ways)} could move it, none can be approached",
+    )
+
+
+def way_in_hand(
+    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float
+) -> PartWay | None:
+    """The way to lead a part towards another opening by its handle, as the hand holds that now.
+
+    It may end short of `opening` [m or rad]; None if there is none at all.
+    """
+    hold, tilt = grip_now(part, planner.tcp_pose(estimate.joints), estimate.opening)
+    return find_way(
+        planner,
+        part,
+        hold,
+        opening,
+        near=estimate.joints,
+        start=estimate.joints,
+        start_tilt=tilt,
+    )
+
+
+def push_part(
+    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float
+) -> PartPush:
+    """A push with closed fingers that moves the part all the way.
+
+    Raises:
+      StageFailure: There is none.
+    """
+    complete = tried = 0
+    for hold in _pushes(planner, part, opening):
+        tried += 1
+        way = find_way(planner, part, hold, opening, near=estimate.joints)
+        if way is None or share_of(way, part, opening) < 0.999:
+            continue
+        complete += 1
+        start_tilt = float(way.tilts[0])
+        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], hold.opening):
+            free_path = planner.free_path(
+                estimate.joints, line[-1], CollisionQuery(opening=hold.opening)
+            )
+            if free_path is not None:
+                approach = np.concatenate([line[::-1], way.joints[:1]])
+                return PartPush(free_path, approach, way)
+        if complete == _MAX_TRIES:
+            break
+    raise StageFailure(
+        "plan", f"no push moves {part.name}: {tried} tried, {complete} of them lead all the way"
+    )
+
+
+def ending_free(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> PartWay | None:
+    """As much of a grip's way as leads to where the open hand can back off; None if nowhere."""
+    for count in range(len(way.openings), 1, -_STEP_BACK):
+        shorter = PartWay(way.hold, way.joints[:count], way.openings[:count], way.tilts[:count])
+        if _can_get_off(planner, part, shorter):
+            return shorter
+    return None
+
+
+def off_surface(
+    planner: MotionPlanner, part: PartEstimate, way: PartWay, joints: Float[np.ndarray, "7"]
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets away from what was pushed, from where the push ended."""
+    assert isinstance(way.hold, Push)
+    return next(_lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, None), None)
+
+
+def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Iterator[Push]:
+    if opening < part.opening:
+        return shutting_pushes(part)
+    return opening_pushes(planner, part)
+
+
+def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:
+    """How much of the way to `opening` it goes."""
+    return float((way.openings[-1] - part.opening) / (opening - part.opening))
+
+
+def _turned(way: PartWay) -> float:
+    """How much the arm turns on the way, with a price on starting tilted [rad]."""
+    return float(np.abs(np.diff(way.joints, axis=0)).max(axis=1).sum() + 0.5 * abs(way.tilts[0]))
+
+
+def _can_get_off(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
+    """Whether the open hand can back off from the handle at the end."""
+    opening = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
+    at_end = planner.within(with_part_at(planner.scene, part, float(way.openings[-1])))
+    back = _backwards(at_end, part, way.joints[-1], opening, (HANDLE_RETREATS[-1],))
+    return back is not None
+
+
+def _backwards(
+    planner: MotionPlanner,
+    part: PartEstimate,
+    joints: Float[np.ndarray, "7"],
+    opening: float,
+    standoffs: tuple[float, ...],
+) -> Float[np.ndarray, "t 7"] | None:
+    """A straight approach along the hand's own axis, which ends at `joints`."""
+    touched = frozenset({planner.body_name(part.body)})
+    query = CollisionQuery(_APPROACH, opening=opening, target=part.geoms)
+    for standoff in standoffs:
+        goal = planner.backed_off(joints, standoff)
+        back = planner.line(joints, goal, query, touched=touched)
+        if back is not None:
+            return np.concatenate([back[::-1], joints[None]])
+    return None
+
+
+def _lines_off(
+    planner: MotionPlanner,
+    part: PartEstimate,
+    hold: Push,
+    tilt: float,
+    joints: Float[np.ndarray, "7"],
+    opening: float | None,
+) -> Iterator[Float[np.ndarray, "t 7"]]:
+    """Straight lines off the surface, the part where the scene has it."""
+    touched = frozenset({planner.body_name(part.body)})
+    query = CollisionQuery(CONTACT, opening=opening, target=part.geoms)
+    pose = part.base_pose @ joint_motion(part, part.opening)
+    for away, back in _PUSH_STANDOFFS:
+        goal = pose @ shifted(hold, away).tcp_poses(np.array([tilt]))[0]
+        goal[:3, 3] -= back * goal[:3, 2]
+        line = planner.line(joints, goal, query, touched=touched)
+        if line is not None:
+            yield line

@@ -1,0 +1,254 @@
+"""Choosing a grasp: reachable, free of collision, and good for what comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.grasping.candidates import (
+    Grasps,
+    Reach,
+    object_grasps,
+    reachable,
+)
+from manipose_mj.control.grasping.part_pick import grip_handle
+from manipose_mj.control.grasping.retraction import (
+    equivalent_poses,
+    find_place,
+    retractions,
+    transport_path,
+)
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.cavity_mouth import way_out
+from manipose_mj.control.scene.collision_query import CONTACT, AttachedObject, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
+from manipose_mj.failures import StageFailure
+from manipose_mj.poses import invert, rotation_angle
+
+_STANDOFFS = (0.10, 0.06)
+# Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
+# A grasp this far from the label's origin [m] counts as one unit worse than one at it.
+_LEVER = 0.08
+_MAX_PAIRS = 2400
+_MAX_APPROACHES = 40
+_MAX_TRIES = 12
+# What can be lifted so far has room around it: a path is taken for granted before it is needed [m].
+_ROOMY = 0.05
+# The approach may brush nothing, but the open fingers pass the object closely.
+_APPROACH = replace(CONTACT, arm=0.002, target=0.0)
+
+
+@dataclass(frozen=True)
+class ObjectPick:
+    """How to take an object.
+
+    Attributes:
+      free_path: Joint targets to where the approach starts `(t, 7)`.
+      approach: Joint targets to the grasp `(s, 7)`.
+      width: Expected between the pads once closed [m].
+      opening: Of the gripper on approach [m].
+      goal: A configuration in which the object is where it shall go; the grasp's own if it goes
+        nowhere.
+    """
+
+    free_path: Float[np.ndarray, "t 7"]
+    approach: Float[np.ndarray, "s 7"]
+    width: float
+    opening: float
+    goal: Float[np.ndarray, "7"]
+
+
+@dataclass(frozen=True)
+class PartPick(ObjectPick):
+    """How to take a part by its handle."""
+
+
+def pick_object(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    obj: ObjectEstimate,
+    destinations: tuple[Float[np.ndarray, "4 4"], ...],
+) -> ObjectPick:
+    """The first grasp, in order of promise, that can be approached and can reach a destination.
+
+    Args:
+      planner: Plans in the scene of `estimate`.
+      estimate: What is where.
+      obj: What to take.
+      destinations: `T_world_label` that it shall go to, any of them; empty if it only is to be held.
+
+    Raises:
+      StageFailure: There is none; the reason says at which filter the last ones fell.
+    """
+    grasps = object_grasps(obj)
+    reach = reachable(grasps.tcp_poses, estimate.joints)
+    if not len(reach.index):
+        raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")
+    free = _free_of_collision(planner, grasps, reach, obj.geoms)
+    if not len(free.index):
+        raise StageFailure("plan", f"all {len(reach.index)} reachable grasps of {obj.name} collide")
+    approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
+    way = way_out(estimate, destinations[0][:3, 3]) if destinations else None
+    tries = 0
+    for index, joints, goal in _with_destination(planner, grasps, free, obj, destinations):
+        if index not in approaches:
+            approaches[index] = _approach(planner, grasps, index, joints, obj.geoms)
+        approach = approaches[index]
+        if tries == _MAX_TRIES or len(approaches) == _MAX_APPROACHES:
+            break
+        if approach is None:
+            continue
+        tries += 1
+        retraction = _retract(planner, estimate, grasps, index, obj, joints)
+        if destinations and (
+            retraction is None
+            or not _can_transport(planner, grasps, index, obj, retraction, destinations, goal, way)
+        ):
+            continue
+        width, opening = float(grasps.widths[index]), float(grasps.openings[index])
+        query = CollisionQuery(opening=opening)
+        free_path = planner.free_path(estimate.joints, approach[0], query)
+        if free_path is not None:
+            return ObjectPick(free_path, approach, width, opening, goal)
+    counts = f"{len(free.index)} grasps of {obj.name} are free to take"
+    if not approaches:
+        raise StageFailure("plan", f"{counts}, none can have it at its destination")
+    if not tries:
+        raise StageFailure("plan", f"{counts}, none of {len(approaches)} has a straight approach")
+    raise StageFailure("plan", f"{counts}, none of {tries} could be carried out")
+
+
+def pick_part(
+    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float | None
+) -> PartPick:
+    """A grip of the handle that can be approached and moves the part towards `opening`; None: anywhere.
+
+    Raises:
+      StageFailure: There is none.
+    """
+    grip = grip_handle(planner, estimate, part, opening)
+    return PartPick(grip.free_path, grip.approach, grip.width, grip.opening, grip.approach[-1])
+
+
+def _free_of_collision(
+    planner: MotionPlanner, grasps: Grasps, reach: Reach, target: np.ndarray
+) -> Reach:
+    kept = []
+    for k, index in enumerate(reach.index):
+        query = CollisionQuery(_APPROACH, opening=float(grasps.openings[index]), target=target)
+        if not planner.collides(reach.joints[k], query):
+            kept.append(k)
+    return Reach(reach.index[kept], reach.joints[kept])
+
+
+def _with_destination(
+    planner: MotionPlanner,
+    grasps: Grasps,
+    free: Reach,
+    obj: ObjectEstimate,
+    destinations: tuple[Float[np.ndarray, "4 4"], ...],
+) -> Iterator[tuple[int, Float[np.ndarray, "7"], Float[np.ndarray, "7"]]]:
+    """Grasp index, joints at the grasp and at a destination, the most promising first.
+
+    At the destination the arm and what it carries are free of collision.
+    """
+    if not destinations:
+        yield from ((int(i), q, q) for i, q in zip(free.index, free.joints, strict=True))
+        return
+    goals = equivalent_poses(destinations, obj.label.symmetry)
+    tcp_starts = grasps.tcp_poses[free.index]
+    label_tcp = invert(obj.label_pose) @ tcp_starts
+    tcp_goals = (goals[None] @ label_tcp[:, None]).reshape(-1, 4, 4)
+    owner = np.repeat(np.arange(len(free.index)), len(goals))
+    lever = np.linalg.norm(label_tcp[:, :3, 3], axis=1)
+    effort = (owner / len(free.index)) + lever[owner] / _LEVER
+    promise = _promise(tcp_starts[owner], tcp_goals) + effort
+    likely = np.argsort(promise, kind="stable")[:_MAX_PAIRS]
+    owner, tcp_goals, promise = owner[likely], tcp_goals[likely], promise[likely]
+    starts = free.joints[owner]
+    reach = reachable(tcp_goals, free.joints.mean(axis=0), extra_seeds=starts)
+    travel = np.abs(reach.joints - starts[reach.index]).max(axis=1)
+    # A short way with a middling grasp beats a long one with the best.
+    order = np.argsort(travel + promise[reach.index], kind="stable")
+    used: dict[int, int] = {}
+    for k in order:
+        grasp = int(owner[reach.index[k]])
+        if used.get(grasp, 0) == 2:
+            continue
+        index = int(free.index[grasp])
+        if planner.collides(reach.joints[k], _attached(grasps, index, obj).query(CONTACT)):
+            continue
+        used[grasp] = used.get(grasp, 0) + 1
+        yield index, free.joints[grasp], reach.joints[k]
+
+
+def _promise(
+    tcp_starts: Float[np.ndarray, "n 4 4"], tcp_goals: Float[np.ndarray, "n 4 4"]
+) -> Float[np.ndarray, "n"]:
+    """A guess, before any kinematics, at how hard a pair is: less is better.
+
+    Coming from above meets the least; a hand that has to turn little can do it anywhere.
+    """
+    turn = rotation_angle(tcp_starts[:, :3, :3], tcp_goals[:, :3, :3])
+    return 1 + tcp_goals[:, 2, 2] + turn / np.pi
+
+
+def _retract(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    grasps: Grasps,
+    index: int,
+    obj: ObjectEstimate,
+    joints: Float[np.ndarray, "7"],
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets that take the object off its support."""
+    attached = _attached(grasps, index, obj)
+    way = way_out(estimate, obj.label_pose[:3, 3])
+    return next(retractions(planner, joints, attached, way), None)
+
+
+def _can_transport(
+    planner: MotionPlanner,
+    grasps: Grasps,
+    index: int,
+    obj: ObjectEstimate,
+    retraction: Float[np.ndarray, "t 7"],
+    destinations: tuple[Float[np.ndarray, "4 4"], ...],
+    goal: Float[np.ndarray, "7"],
+    way: Float[np.ndarray, "3"] | None,
+) -> bool:
+    """Whether the lifted object can be set down; where it cannot be lifted far, also on which path."""
+    attached = _attached(grasps, index, obj)
+    pose_tcp = invert(grasps.tcp_poses[index]) @ obj.label_pose
+    symmetry = obj.label.symmetry
+    place = find_place(planner, pose_tcp, destinations, symmetry, attached, goal, way)
+    if place is None:
+        return False
+    risen = planner.tcp_pose(retraction[-1])[2, 3] - planner.tcp_pose(retraction[0])[2, 3]
+    if risen > _ROOMY:
+        return True
+    return transport_path(planner, retraction[-1], place.above, attached) is not None
+
+
+def _attached(grasps: Grasps, index: int, obj: ObjectEstimate) -> AttachedObject:
+    """The object in the hand, as this grasp would hold it."""
+    return obj.attached_to(grasps.tcp_poses[index], float(grasps.widths[index]))
+
+
+def _approach(
+    planner: MotionPlanner,
+    grasps: Grasps,
+    index: int,
+    joints: Float[np.ndarray, "7"],
+    target: np.ndarray,
+) -> Float[np.ndarray, "s 7"] | None:
+    """Joint targets of a straight approach to the grasp; None if there is none."""
+    query = CollisionQuery(_APPROACH, opening=float(grasps.openings[index]), target=target)
+    for standoff in _STANDOFFS:
+        back = planner.line(joints, planner.backed_off(joints, standoff), query)
+        if back is not None:
+            return np.concatenate([back[::-1], joints[None]])
+    return None

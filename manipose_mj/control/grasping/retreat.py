@@ -1,0 +1,44 @@
+"""Backing off from what the hand has let go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.collision_query import CONTACT, TRANSIT, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+
+# How far to back off after letting go, best first [m]; the last must do.
+RETREATS = (0.12, 0.18, 0.09, 0.06)
+HANDLE_RETREATS = (0.10, 0.07, 0.045)
+
+
+def retreat(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    released: Bool[np.ndarray, "ngeom"],
+    touched: frozenset[str],
+    distances: Sequence[float] = RETREATS,
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets straight back, to where the next motion has room if there is such a place.
+
+    Args:
+      planner: Plans in the scene of `estimate`.
+      estimate: What is where.
+      released: Mask of the geoms that the gripper may touch on the way.
+      touched: Names of bodies that it touches.
+      distances: To try, the best first [m].
+    """
+    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released)
+    found = None
+    for distance in distances:
+        back = planner.backed_off(estimate.joints, distance)
+        line = planner.line(estimate.joints, back, query, touched=touched)
+        if line is not None and not planner.collides(line[-1], CollisionQuery(TRANSIT)):
+            return line
+        found = line if found is None else found
+    return found

@@ -1,0 +1,1 @@
+"""Collision-free motions of the arm: inverse kinematics, RRT-Connect, lines, timing."""

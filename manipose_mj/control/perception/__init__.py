@@ -1,0 +1,1 @@
+"""From observations to the estimated scene; the oracle beside it."""

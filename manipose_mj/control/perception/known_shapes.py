@@ -1,0 +1,186 @@
+"""What is known about a category: a few of its training objects, with their parts and ways to lie.
+
+An estimate says where an object's label is and how long its sides are, not what it looks like. The
+training object that fits the cloud best, stretched to these lengths, stands in for it: the planner
+keeps clear of its convex parts, and grasps are sampled on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+from trimesh.convex import convex_hull
+
+from manipose_mj.assets import catalogue
+from manipose_mj.assets.asset import Asset, GraspSet, StablePose
+from manipose_mj.assets.geometry import Body, MassProperties, Shape
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.assets.visible_shapes import surface, visible_shapes
+from manipose_mj.grasp_sampling.sampler import sample_grasps
+from manipose_mj.poses import SymmetryGroup, compose, invert, transform
+
+SHAPES = 8  # training objects of a category that are known: its styles take turns among them
+_SURFACE_POINTS = 1500
+_ALIKE = 0.04  # relative difference of two lengths from which on a turn no longer exchanges them
+_FAR = (
+    0.02  # a point further from the surface counts as this far: it is noise or somebody else's [m]
+)
+_ROUND = 16  # corners that a circle is drawn with
+
+
+@dataclass(frozen=True)
+class KnownShape:
+    """An object in its label frame.
+
+    Attributes:
+      name: Of the training object.
+      label: In this frame: its pose is the identity.
+      hulls: Vertices of the convex parts, `(v, 3)` each [m].
+      surface: `(m, 3)`, random points of what is seen of it [m].
+      rests: Stable poses, of the label frame.
+      mass: As of the training object; its centre [m].
+    """
+
+    name: str
+    label: PoseLabel
+    hulls: tuple[Float[np.ndarray, "_ 3"], ...]
+    surface: Float[np.ndarray, "m 3"]
+    rests: tuple[StablePose, ...]
+    mass: MassProperties
+
+    @property
+    def extents(self) -> Float[np.ndarray, "3"]:
+        """Lengths of the bounding box along the label's axes [m]."""
+        return self.label.extents
+
+    def stretched(self, extents: Float[np.ndarray, "3"]) -> KnownShape:
+        """The same shape with other lengths [m], lying on the same sides."""
+        scale = np.asarray(extents, float) / self.extents
+        hulls = tuple(hull * scale for hull in self.hulls)
+        corners = np.concatenate(hulls)
+        rests = tuple(
+            replace(rest, height=-float((corners @ rest.rotation[2]).min())) for rest in self.rests
+        )
+        symmetry = _kept(self.label.symmetry, np.asarray(extents, float))
+        return KnownShape(
+            name=self.name,
+            label=replace(self.label, extents=np.asarray(extents, float), symmetry=symmetry),
+            hulls=hulls,
+            surface=self.surface * scale,
+            rests=rests,
+            mass=replace(self.mass, center_of_mass=self.mass.center_of_mass * scale),
+        )
+
+    def sampled_grasps(self) -> GraspSet:
+        """Antipodal grasps of the convex parts, clear of the support in each of `rests`."""
+        parts = tuple(Shape("mesh", mesh=convex_hull(hull)) for hull in self.hulls)
+        body = Body(self.name, collision=parts, visual=parts, mass_properties=self.mass)
+        return sample_grasps(body, self.rests)
+
+    def misfit(self, points_label: Float[np.ndarray, "n 3"]) -> float:
+        """Mean distance of points in the label frame from the surface, none counted beyond 2 cm [m]."""
+        distance, _ = cKDTree(self.surface).query(points_label, distance_upper_bound=_FAR)
+        return float(np.minimum(distance, _FAR).mean())
+
+
+def best_fit(
+    shapes: Sequence[KnownShape],
+    extents: Float[np.ndarray, "3"],
+    points_label: Float[np.ndarray, "n 3"],
+) -> tuple[KnownShape, float]:
+    """The shape that, stretched to `extents` [m], is nearest to the points; and its misfit [m]."""
+    stretched = [shape.stretched(extents) for shape in shapes]
+    misfits = [shape.misfit(points_label) for shape in stretched]
+    best = int(np.argmin(misfits))
+    return stretched[best], misfits[best]
+
+
+@cache
+def known_shapes(category: str) -> tuple[KnownShape, ...]:
+    """The first `SHAPES` training objects of a category; built on first use.
+
+    Raises:
+      InputError: There is no such category.
+    """
+    count = len(catalogue.instances(category))  # refuses what is no category
+    row = catalogue.CATALOGUE[category]
+    training = [index for index in range(count) if row.split(index) == "train"]
+    return tuple(shape_of(catalogue.load(category, index)) for index in training[:SHAPES])
+
+
+def shape_of(asset: Asset) -> KnownShape:
+    """A built rigid asset as a known shape."""
+    to_label = invert(asset.label.pose)
+    mesh = surface(visible_shapes(asset.folder))
+    samples = mesh.sample(_SURFACE_POINTS, seed=0)
+    mass = asset.mass_properties
+    hulls = tuple(transform(to_label, hull) for hull in _collision_hulls(asset))
+    rests = tuple(
+        StablePose(
+            rotation=rest.rotation @ asset.label.rotation,
+            height=rest.height + float(rest.rotation[2] @ asset.label.origin),
+            probability=rest.probability,
+        )
+        for rest in asset.stable_poses
+    )
+    return KnownShape(
+        name=asset.name,
+        label=replace(asset.label, origin=np.zeros(3), rotation=np.eye(3)),
+        hulls=hulls,
+        surface=transform(to_label, np.asarray(samples, float)),
+        rests=rests,
+        mass=replace(mass, center_of_mass=transform(to_label, mass.center_of_mass[None])[0]),
+    )
+
+
+def _collision_hulls(asset: Asset) -> list[Float[np.ndarray, "_ 3"]]:
+    """Vertices of the convex parts of an asset, object frame [m]."""
+    model = mujoco.MjModel.from_xml_path(str(asset.model_path))
+    found = []
+    for geom in np.flatnonzero(model.geom_contype):
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        pose = compose(rotation.reshape(3, 3), model.geom_pos[geom].copy())
+        found.append(transform(pose, _corners(model, int(geom))))
+    return found
+
+
+def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "v 3"]:
+    """Points whose convex hull is a geom, of round ones nearly, in the geom's frame [m]."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        return model.mesh_vert[first : first + count].astype(float)
+    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return signs * size
+    angle = np.linspace(0, 2 * np.pi, _ROUND, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) * size[0]
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        levels = [(1.0, -size[1]), (1.0, size[1])]
+    else:
+        half = float(size[1]) if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
+        tilts = np.linspace(-np.pi / 2, np.pi / 2, 9)
+        levels = [(np.cos(t), np.sign(t) * half + np.sin(t) * size[0]) for t in tilts]
+        if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            unit = np.concatenate(
+                [np.column_stack([circle / size[0] * np.cos(t), np.full(_ROUND, np.sin(t))]) for t in tilts]
+            )  # fmt: skip
+            return unit * size
+    return np.concatenate(
+        [np.column_stack([circle * share, np.full(_ROUND, height)]) for share, height in levels]
+    )
+
+
+def _kept(symmetry: SymmetryGroup, extents: Float[np.ndarray, "3"]) -> SymmetryGroup:
+    """The turns that exchange no sides of different lengths."""
+    swapped = np.abs(symmetry.rotations) @ extents
+    kept = (np.abs(swapped - extents) <= _ALIKE * extents.max()).all(axis=1)
+    return SymmetryGroup(symmetry.rotations[kept], axial=symmetry.axial)

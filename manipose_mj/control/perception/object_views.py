@@ -1,0 +1,103 @@
+"""What each camera sees of one object: the crops that a pose estimator looks at.
+
+Read from a task's observations of depth and segmentation, and from nothing else of the simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dm_control import mjcf
+from dm_control.composer.observation.observable import Observable
+from jaxtyping import Bool, Float
+
+from manipose_mj.mjcf.cameras.clouds import subset
+from manipose_mj.mjcf.cameras.depth_normals import depth_normals
+from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
+from manipose_mj.poses import transform
+
+MAX_VIEW_POINTS = 256  # what an estimator samples of a cloud: one padded size, one compilation
+
+
+@dataclass(frozen=True)
+class ObjectView:
+    """One camera's points on one object.
+
+    Attributes:
+      camera: Its name.
+      T_world_camera: `(4, 4)`, OpenCV's axes.
+      points: `(n, 3)` float32 [m], camera frame.
+      normals: `(n, 3)` float32, unit, towards the camera, camera frame.
+    """
+
+    camera: str
+    T_world_camera: Float[np.ndarray, "4 4"]
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def points_world(self) -> Float[np.ndarray, "n 3"]:
+        """The points in the world frame [m]."""
+        return transform(self.T_world_camera, self.points.astype(float))
+
+
+class ObjectViews:
+    """Crops objects out of a task's depth images by its segmentation."""
+
+    def __init__(self, observables: Mapping[str, Observable], cameras: Sequence[str]) -> None:
+        """Looks at nothing yet.
+
+        Args:
+          observables: Of the task, enabled or not.
+          cameras: Names of those to look through.
+        """
+        self._observables = observables
+        self._cameras = tuple(cameras)
+
+    def of(self, physics: mjcf.Physics, name: str) -> tuple[ObjectView, ...]:
+        """What the cameras see of an object now, each camera that sees anything of it.
+
+        Args:
+          physics: That the sensors measure.
+          name: Of the object, as the task's goals call it.
+        """
+        number = int(self._read(physics, f"segmentation/ids/{name}")[0])
+        found = []
+        for camera in self._cameras:
+            depth = self._read(physics, f"depth/{camera}")
+            mask = (self._read(physics, f"segmentation/{camera}") == number) & (depth > 0)
+            if not mask.any():
+                continue
+            pose = self._read(physics, f"camera/{camera}/pose")
+            matrix = self._read(physics, f"camera/{camera}/intrinsics")
+            found.append(_view(camera, pose, _intrinsics(matrix, depth.shape), depth, mask))
+        return tuple(found)
+
+    def _read(self, physics: mjcf.Physics, key: str) -> np.ndarray:
+        return np.asarray(self._observables[key](physics))
+
+
+def _view(
+    camera: str,
+    pose: Float[np.ndarray, "4 4"],
+    intrinsics: Intrinsics,
+    depth: Float[np.ndarray, "height width"],
+    mask: Bool[np.ndarray, "height width"],
+) -> ObjectView:
+    pixels = np.argwhere(mask)
+    pixels = pixels[subset(len(pixels), MAX_VIEW_POINTS)]
+    measured = depth[pixels[:, 0], pixels[:, 1], None].astype(float)
+    slopes = (pixels[:, ::-1] - [intrinsics.cx, intrinsics.cy]) / [intrinsics.fx, intrinsics.fy]
+    points = np.concatenate([slopes, np.ones((len(pixels), 1))], axis=1) * measured
+    normals = depth_normals(depth, mask, pixels, intrinsics)
+    return ObjectView(camera, pose, points.astype(np.float32), normals.astype(np.float32))
+
+
+def _intrinsics(matrix: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> Intrinsics:
+    fx, fy, cx, cy = (float(matrix[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    return Intrinsics(shape[1], shape[0], fx, fy, cx, cy)

@@ -1,0 +1,1 @@
+"""Plans of primitives: grasps chosen, objects moved out of the way, transport."""

@@ -1,0 +1,244 @@
+"""Plans around drawers and doors: open them, put objects behind them, take objects out, shut them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.plan import Plan, Step
+from manipose_mj.control.planning.regrasp import Poses, routes
+from manipose_mj.control.planning.table_places import (
+    DROP_HEIGHT,
+    YAWS,
+    resting_height,
+    resting_rotation,
+)
+from manipose_mj.control.planning.transport import place_at_each
+from manipose_mj.control.scene.articulation import joint_motion, with_part_at
+from manipose_mj.control.scene.cavity_mouth import outwards
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
+from manipose_mj.errors import InputError
+from manipose_mj.poses import compose, invert, rotation_about
+from manipose_mj.tasks.goals import InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
+
+PartGoal = InsideGoal | TakenOutGoal | OpenGoal | ShutGoal
+
+# How far to open, of the joint's range: all the way would ram the stop.
+OPEN_SHARE = 0.95
+OPEN_ENOUGH = 0.85
+SHUT_ENOUGH = 0.005  # of a joint [m or rad]
+CAVITY_MARGIN = np.array([0.010, 0.010, 0.004])  # in all, along each axis [m]
+# Where in the cavity, as a share of the free way from its middle to its front: the hand that sets
+# something down needs room in front of what is above, or beside, or both.
+_DRAWER_FRONT = (0.35, 0.5, 0.2, 0.7, 0.95, 0.0, -0.3, -0.6)
+_DOOR_FRONT = (0.95, 0.75, 0.5, 0.25)
+_SIDEWAYS = (0.0, 0.3, -0.3, 0.6, -0.6, 0.95, -0.95)
+_MAX_PER_WAY = 3  # places in the cavity for each way to lie
+_APART = 0.008  # between objects that lie side by side [m]
+_SAME_SIDE = 0.95  # cosine from which on two verticals are one
+_AREA_SHARES = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def part_goal_plans(
+    goal: PartGoal,
+    estimate: SceneEstimate,
+    planner: MotionPlanner | None,
+    opened: frozenset[str] = frozenset(),
+) -> Iterator[Plan]:
+    """Plans that reach one goal, the most promising first.
+
+    Args:
+      goal: What to reach.
+      estimate: What is where.
+      planner: Of motions in the scene of `estimate`; without one nothing is set down on the way.
+      opened: Parts that are open by then, because of the steps before.
+
+    Raises:
+      InputError: An object fits a cavity in no orientation.
+    """
+    part = estimate.parts[goal.part]
+    low, high = part.joint.range
+    if isinstance(goal, ShutGoal):
+        shut = goal.part not in opened and part.opening <= low + SHUT_ENOUGH
+        yield () if shut else (Step("move_to", goal.part, opening=low),)
+    elif isinstance(goal, OpenGoal):
+        share = max(OPEN_SHARE, min((1 + goal.fraction) / 2, 1.0))
+        is_open = part.opening >= low + goal.fraction * (high - low)
+        yield () if is_open else _open(part, low + share * (high - low))
+    elif is_reached(goal, estimate):
+        yield ()
+    else:
+        yield from _plans_through(goal, estimate, planner, part)
+
+
+def is_reached(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:
+    """Whether the object is where the goal has it."""
+    obj, part = estimate.objects[goal.object], estimate.parts[goal.part]
+    inside = lies_inside(obj, part)
+    if isinstance(goal, InsideGoal):
+        return inside
+    return not inside and _near_one(obj, poses_in_area(goal, obj))
+
+
+def _plans_through(
+    goal: InsideGoal | TakenOutGoal,
+    estimate: SceneEstimate,
+    planner: MotionPlanner | None,
+    part: PartEstimate,
+) -> Iterator[Plan]:
+    """Plans that open the part where it is shut, and bring the object into it or out of it."""
+    obj, (low, high) = estimate.objects[goal.object], part.joint.range
+    wide_open = low + OPEN_SHARE * (high - low)
+    if isinstance(goal, InsideGoal):
+        poses = poses_in_cavity(obj, part, wide_open, estimate)
+        if not poses:
+            raise InputError(f"{goal.object} fits the cavity of {goal.part} in no orientation")
+    else:
+        poses = poses_in_area(goal, obj)
+    is_shut = part.opening < low + OPEN_ENOUGH * (high - low)
+    opening = _open(part, wide_open) if is_shut else ()
+    if planner is None or lies_inside(obj, part):
+        yield opening + place_at_each(goal.object, (poses,))
+        return
+    by_then = with_part_at(planner.scene, part, max(wide_open, part.opening))
+    for stops in routes(planner.within(by_then), estimate, obj, poses):
+        yield opening + place_at_each(goal.object, stops)
+
+
+def _open(part: PartEstimate, opening: float) -> Plan:
+    """By the handle; a door that the hand cannot lead all the way is then pushed on from inside."""
+    name = part.name
+    plan: Plan = (
+        Step("grasp_at", name),
+        Step("move_to", name, opening=opening),
+        Step("release", name),
+    )
+    return plan if part.joint.kind == "slide" else (*plan, Step("move_to", name, opening=opening))
+
+
+def lies_inside(obj: ObjectEstimate, part: PartEstimate) -> bool:
+    """Whether the object's middle is in the part's cavity."""
+    if part.cavity is None:
+        return False
+    carrier = part.pose if part.cavity.moves_with_part else part.base_pose
+    place_ = (invert(carrier) @ obj.label_pose)[:3, 3] - part.cavity.center
+    return bool((np.abs(place_) < part.cavity.extents / 2).all())
+
+
+def _near_one(obj: ObjectEstimate, poses: Poses) -> bool:
+    """Whether the object is at one of the places already, turned as it may be."""
+    places = np.stack([pose[:3, 3] for pose in poses])
+    return bool((np.linalg.norm(places - obj.label_pose[:3, 3], axis=1) < 0.05).any())
+
+
+def poses_in_area(goal: TakenOutGoal, obj: ObjectEstimate) -> Poses:
+    """`T_world_label` in the goal area, resting on the side that is down now."""
+    own = obj.label_pose[:3, :3]
+    height = resting_height(obj, own) + DROP_HEIGHT
+    turns = YAWS[:1] if obj.label.symmetry.axial and abs(own[2, 0]) > 0.99 else YAWS
+    return tuple(
+        compose(
+            rotation_about(_UP, yaw) @ own,
+            np.array([*(goal.center + np.array(share) * goal.half_sides), height]),
+        )
+        for share in _AREA_SHARES
+        for yaw in turns
+    )
+
+
+def poses_in_cavity(
+    obj: ObjectEstimate, part: PartEstimate, opening: float, estimate: SceneEstimate | None = None
+) -> Poses:
+    """Label poses in which the object's bounding box rests on the cavity's floor and fits it.
+
+    Args:
+      obj: What to store.
+      part: The drawer or door.
+      opening: Joint position while the object is put in [m or rad].
+      estimate: What else there is; what lies in the cavity is kept clear of.
+
+    Returns:
+      `T_world_label`: those first that keep the side that is down now, then lying ones, which are
+      easiest to shut away; towards the front.
+    """
+    cavity = part.cavity
+    if cavity is None:
+        return ()
+    carrier = part.base_pose
+    if cavity.moves_with_part and part.joint.kind == "slide":
+        carrier = part.base_pose @ joint_motion(part, opening)
+    front = outwards(part)
+    across = np.cross(_UP, front)
+    shares = _DRAWER_FRONT if cavity.moves_with_part else _DOOR_FRONT
+    taken = [] if estimate is None else _boxes_inside(estimate, obj, part)
+    down = obj.label_pose[2, :3]
+    found = []
+    for rotation in _ways_to_turn(obj):
+        reach = np.abs(rotation) @ obj.label.extents / 2
+        slack = (cavity.extents - CAVITY_MARGIN) / 2 - reach
+        if (slack < 0).any():
+            continue
+        height = resting_height(obj, rotation) if obj.rests else reach[2]
+        floor = np.array([0.0, 0.0, height + DROP_HEIGHT - cavity.extents[2] / 2])
+        other_side = float(rotation[2] @ down) < _SAME_SIDE
+        count = 0
+        for sideways in _SIDEWAYS:
+            for share in shares:
+                place_ = (share * front + sideways * across) * slack
+                if count == _MAX_PER_WAY or _meets(place_, reach, taken):
+                    continue
+                count += 1
+                pose = carrier @ compose(rotation, cavity.center + floor + place_)
+                found.append((other_side, round(reach[2], 4), abs(sideways), -share, pose))
+    found.sort(key=lambda entry: entry[:4])
+    return tuple(entry[4] for entry in found)
+
+
+Box = tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]
+
+
+def _boxes_inside(estimate: SceneEstimate, obj: ObjectEstimate, part: PartEstimate) -> list[Box]:
+    """Middle and half lengths along x and y of what lies in the cavity, from the cavity's middle [m]."""
+    assert part.cavity is not None
+    carrier = part.pose if part.cavity.moves_with_part else part.base_pose
+    boxes = []
+    for other in estimate.objects.values():
+        if other.name != obj.name and lies_inside(other, part):
+            pose = invert(carrier) @ other.label_pose
+            reach = np.abs(pose[:3, :3]) @ other.label.extents / 2
+            boxes.append(((pose[:3, 3] - part.cavity.center)[:2], reach[:2]))
+    return boxes
+
+
+def _meets(place_: Float[np.ndarray, "3"], reach: Float[np.ndarray, "3"], taken: list[Box]) -> bool:
+    return any(
+        (np.abs(place_[:2] - middle) < reach[:2] + half + _APART).all() for middle, half in taken
+    )
+
+
+def _ways_to_turn(obj: ObjectEstimate) -> list[Float[np.ndarray, "3 3"]]:
+    """Stable poses in quarter turns; where none are known the 24 rotations of a cube, of an axial
+    label those that differ."""
+    if obj.rests:
+        return [
+            resting_rotation(obj, rest, quarter * np.pi / 2)
+            for rest in obj.rests
+            for quarter in range(4)
+        ]
+    quarter = [
+        [rotation_about(np.eye(3)[axis], k * np.pi / 2) for k in range(4)] for axis in (0, 2)
+    ]
+    tilts = [rotation_about(np.eye(3)[1], k * np.pi / 2) for k in (1, 3)]
+    first = [x for x in quarter[0]] + tilts
+    rotations = [np.round(z @ x) for x in first for z in quarter[1]]
+    if not obj.label.symmetry.axial:
+        return rotations
+    return [
+        rotation
+        for i, rotation in enumerate(rotations)
+        if not any(np.allclose(rotation[:, 0], other[:, 0]) for other in rotations[:i])
+    ]

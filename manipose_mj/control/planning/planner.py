@@ -1,0 +1,71 @@
+"""A symbolic planner: from goals and an estimate of the scene to plans of primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.plan import CandidatePlan, Plan
+from manipose_mj.control.planning.plan_articulated import PartGoal, is_reached, part_goal_plans
+from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
+from manipose_mj.control.planning.transport import RestGoal, transport_plans
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
+
+
+def candidate_plans(
+    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner | None = None
+) -> Iterator[CandidatePlan]:
+    """Plans that reach the goals, one after the other; the most promising first, at least one.
+
+    In clutter each is one move only; no steps at all when the goals are reached.
+
+    Args:
+      goals: All of them.
+      estimate: What is where.
+      planner: Of motions in the scene of `estimate`; without one nothing is set down on the way.
+
+    Raises:
+      InputError: On the way through them. A goal names something that is not there, an object fits
+        a cavity in no orientation, or in clutter there are no more.
+    """
+    if planner is not None and in_clutter(goals, estimate):
+        yield from candidate_moves(goals, estimate, planner)
+        return
+    for plan in _joined(_plans_of_each(goals, estimate, planner)):
+        yield CandidatePlan(lambda plan=plan: plan)
+
+
+def make_plan(
+    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner | None = None
+) -> Plan:
+    """The most promising plan; arguments and errors as for `candidate_plans`."""
+    return next(candidate_plans(goals, estimate, planner)).steps()
+
+
+def _plans_of_each(
+    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner | None
+) -> list[Iterator[Plan]]:
+    """Alternative plans for each goal, which count on the plans of the goals before it."""
+    plans: list[Iterator[Plan]] = []
+    opened: frozenset[str] = frozenset()
+    for goal in goals:
+        if isinstance(goal, RestGoal):
+            plans.append(transport_plans(goal, estimate, planner))
+        elif isinstance(goal, PartGoal):
+            plans.append(part_goal_plans(goal, estimate, planner, opened))
+            if isinstance(goal, InsideGoal | TakenOutGoal) and not is_reached(goal, estimate):
+                opened |= {goal.part}
+    return plans
+
+
+def _joined(plans_of_each: Sequence[Iterator[Plan]]) -> Iterator[Plan]:
+    """All first plans joined, then all second ones; what has no more goes on with its last."""
+    plans: list[Plan | None] = [next(plans) for plans in plans_of_each]
+    last = [plan or () for plan in plans]
+    yield sum(last, ())
+    while any(plan is not None for plan in plans):
+        plans = [next(more, None) for more in plans_of_each]
+        last = [old if new is None else new for old, new in zip(last, plans, strict=True)]
+        if any(plan is not None for plan in plans):
+            yield sum(last, ())

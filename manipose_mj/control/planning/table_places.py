@@ -1,0 +1,82 @@
+"""Where on the table an object may rest: label poses that a goal or a placement on the way allows."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import StablePose
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate
+from manipose_mj.mjcf.panda.robot import HOME
+from manipose_mj.poses import compose, rotation_about
+
+UP = np.array([0.0, 0.0, 1.0])
+# An object is let go this high above the table [m].
+DROP_HEIGHT = 0.002
+# Of the label's origin, best first: where the arm works most easily [m].
+PLACES = tuple(
+    (x, y) for x, y in (
+        (0.48, 0.0), (0.46, 0.2), (0.46, -0.2), (0.58, 0.1), (0.58, -0.1), (0.40, 0.32),
+        (0.40, -0.32), (0.36, 0.1), (0.36, -0.1),
+    )
+)  # fmt: skip
+YAWS = tuple(float(yaw) for yaw in np.linspace(-np.pi, np.pi, 8, endpoint=False))
+_UPRIGHT = 0.97  # cosine to the vertical from which on a rest counts as upright
+_SAME_REST = 0.995  # cosine between verticals from which on two rests are one
+
+
+def resting_rotation(obj: ObjectEstimate, rest: StablePose, yaw: float) -> Float[np.ndarray, "3 3"]:
+    """`R_world_label` in a stable pose, turned about the vertical."""
+    return rotation_about(UP, yaw) @ rest.rotation @ obj.label.rotation
+
+
+def resting_height(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> float:
+    """Of the label's origin above the table when the label is turned as `rotation` [m].
+
+    That of the stable pose with the same side down; without one, by the bounding box.
+    """
+    index = rest_of(obj, rotation)
+    if index is None:
+        return float(np.abs(rotation[2]) @ obj.label.extents / 2)
+    rest = obj.rests[index]
+    return rest.height + float(rest.rotation[2] @ obj.label.origin)
+
+
+def rest_of(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> int | None:
+    """Index of the stable pose with the side down that is down when the label is turned so."""
+    down = rotation[2] @ obj.label.rotation.T
+    alike = [float(rest.rotation[2] @ down) for rest in obj.rests]
+    return int(np.argmax(alike)) if alike and max(alike) > _SAME_REST else None
+
+
+def poses_with_rotation(
+    obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]
+) -> tuple[Float[np.ndarray, "4 4"], ...]:
+    """`T_world_label` all over the table, turned as `rotation`, nearest to the object first."""
+    height = resting_height(obj, rotation) + DROP_HEIGHT
+    own = obj.label_pose[:2, 3]
+    order = sorted(PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
+    return tuple(compose(rotation, np.array([x, y, height])) for x, y in order)
+
+
+def upright_poses(obj: ObjectEstimate) -> tuple[Float[np.ndarray, "4 4"], ...]:
+    """`T_world_label` all over the table with the label's X up, turned every way about it."""
+    rests = [r for r in obj.rests if (r.rotation @ obj.label.rotation)[2, 0] > _UPRIGHT]
+    upright = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    turns = YAWS[:1] if obj.label.symmetry.axial else YAWS
+    rotations = [
+        resting_rotation(obj, rests[0], yaw) if rests else rotation_about(UP, yaw) @ upright
+        for yaw in turns
+    ]
+    by_turn = [poses_with_rotation(obj, rotation) for rotation in rotations]
+    # Every turn at the first place, then at the second: no turn is left out of the first few.
+    return tuple(pose for at_place in zip(*by_turn, strict=True) for pose in at_place)
+
+
+def is_free(
+    planner: MotionPlanner, obj: ObjectEstimate, label_pose: Float[np.ndarray, "4 4"]
+) -> bool:
+    """Whether the object would touch nothing but its support there."""
+    return not planner.collides(HOME, CollisionQuery(CONTACT, attached=obj.placed_at(label_pose)))

@@ -1,0 +1,52 @@
+"""Plans that bring an object to rest where a goal wants it, set down on the way where they must."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.plan import Plan, Step
+from manipose_mj.control.planning.regrasp import Poses, routes
+from manipose_mj.control.planning.table_places import poses_with_rotation, upright_poses
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
+from manipose_mj.tasks.goals import OrientationGoal, PoseGoal, UprightGoal
+
+RestGoal = PoseGoal | OrientationGoal | UprightGoal
+
+
+def transport_plans(
+    goal: RestGoal, estimate: SceneEstimate, planner: MotionPlanner | None = None
+) -> Iterator[Plan]:
+    """Plans that bring the goal's object to rest where it shall be, the most promising first.
+
+    Args:
+      goal: What to reach.
+      estimate: What is where.
+      planner: Of motions in the scene of `estimate`; without one nothing is set down on the way.
+    """
+    obj = estimate.objects[goal.object]
+    poses = destinations(goal, obj)
+    if planner is None:
+        yield place(goal.object, poses)
+        return
+    for stops in routes(planner, estimate, obj, poses):
+        yield place_at_each(goal.object, stops)
+
+
+def place_at_each(name: str, stops: tuple[Poses, ...]) -> Plan:
+    """Take an object to one stop after the other, each at any of its poses."""
+    return tuple(step for stop in stops for step in place(name, stop))
+
+
+def place(name: str, poses: Poses) -> Plan:
+    """Take an object, bring its label to one of the poses, let go."""
+    return (Step("grasp_at", name), Step("move_to", name, poses=poses), Step("release", name))
+
+
+def destinations(goal: RestGoal, obj: ObjectEstimate) -> Poses:
+    """`T_world_label` that meet the goal, the likeliest first."""
+    if isinstance(goal, PoseGoal):
+        return (goal.pose,)
+    if isinstance(goal, OrientationGoal):
+        return poses_with_rotation(obj, goal.rotation)
+    return upright_poses(obj)

@@ -1,0 +1,1 @@
+"""The scene as it is estimated, and as planning collides with it."""

@@ -1,0 +1,151 @@
+"""What the baseline knows of the scene, wherever it came from.
+
+The oracle fills it from the simulator; an estimator fills it from clouds. Nothing after this point
+knows the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.assets.asset import Cavity, GraspSet, Joint, StablePose
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.scene.collision_query import AttachedObject, FixedObject
+from manipose_mj.control.scene.planning_scene import PlanningScene
+from manipose_mj.poses import invert
+
+
+@dataclass(frozen=True)
+class ObjectEstimate:
+    """A rigid object.
+
+    Attributes:
+      name: What plans call it.
+      pose: `T_world_object`.
+      label: Its pose label, in the object frame.
+      grasps: In the object frame.
+      body: Its body in the planning scene.
+      geoms: Mask of its geoms there, `(ngeom,)`.
+      rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
+    """
+
+    name: str
+    pose: Float[np.ndarray, "4 4"]
+    label: PoseLabel
+    grasps: GraspSet
+    body: int
+    geoms: Bool[np.ndarray, "ngeom"]
+    rests: tuple[StablePose, ...] = ()
+
+    @property
+    def label_pose(self) -> Float[np.ndarray, "4 4"]:
+        """`T_world_label`."""
+        return self.pose @ self.label.pose
+
+    def attached_to(
+        self, tcp_pose: Float[np.ndarray, "4 4"], opening: float | None = None
+    ) -> AttachedObject:
+        """The object, from where it is now, in a hand at `T_world_tcp`.
+
+        Args:
+          tcp_pose: `T_world_tcp`.
+          opening: Of the gripper that holds it [m]; None: as observed.
+        """
+        return AttachedObject(self.body, self.geoms, invert(tcp_pose) @ self.pose, opening)
+
+    def placed_at(self, label_pose: Float[np.ndarray, "4 4"]) -> FixedObject:
+        """The object with its label at `T_world_label`."""
+        return FixedObject(self.body, self.geoms, label_pose @ invert(self.label.pose))
+
+
+@dataclass(frozen=True)
+class PartEstimate:
+    """A drawer or door.
+
+    Attributes:
+      name: What plans call it.
+      base_pose: `T_world_object` of the piece of furniture.
+      pose: `T_world_part`, equal to `base_pose` while the joint is at zero.
+      opening: Joint position [m or rad].
+      joint: Kind, axis and limits, in the object frame.
+      handle: Label of the handle, in the object frame.
+      cavity: What it gives access to, in the object frame.
+      body: Its body in the planning scene.
+      geoms: Mask of its geoms there, `(ngeom,)`.
+      bodies_inside: Bodies of the objects in its cavity, which move with a drawer.
+    """
+
+    name: str
+    base_pose: Float[np.ndarray, "4 4"]
+    pose: Float[np.ndarray, "4 4"]
+    opening: float
+    joint: Joint
+    handle: PoseLabel
+    cavity: Cavity | None
+    body: int
+    geoms: Bool[np.ndarray, "ngeom"]
+    bodies_inside: tuple[int, ...] = ()
+
+    @property
+    def handle_pose(self) -> Float[np.ndarray, "4 4"]:
+        """`T_world_handle`."""
+        return self.pose @ self.handle.pose
+
+
+@dataclass(frozen=True)
+class SceneEstimate:
+    """All that one observation says.
+
+    Attributes:
+      joints: Of the arm `(7,)` [rad].
+      opening: Of the gripper [m].
+      objects: By name.
+      parts: By name.
+      scene: What a motion could hit; it has everything where the estimates have it.
+    """
+
+    joints: Float[np.ndarray, "7"]
+    opening: float
+    objects: dict[str, ObjectEstimate]
+    parts: dict[str, PartEstimate]
+    scene: PlanningScene
+
+    @property
+    def tcp_pose(self) -> Float[np.ndarray, "4 4"]:
+        """`T_world_tcp`."""
+        return self.scene.tcp_pose(self.joints)
+
+    def in_hand(self, name: str) -> AttachedObject:
+        """An object as the hand holds it now."""
+        return self.objects[name].attached_to(self.tcp_pose)
+
+
+class Perception(Protocol):
+    """Where a policy's knowledge comes from.
+
+    Attributes:
+      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
+    """
+
+    sources: Mapping[str, str]
+
+    def reset(self, seed: int) -> None:
+        """Start an episode; `seed` is that of everything random."""
+        ...
+
+    def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
+        """Joint angles [rad] and opening [m], cheap enough for every control step."""
+        ...
+
+    def observe(self) -> SceneEstimate:
+        """An estimate of the whole scene as it is now."""
+        ...
+
+    def hold(self, name: str | None) -> None:
+        """The hand holds this from now on; None: it has let go."""
+        ...

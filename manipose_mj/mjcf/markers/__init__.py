@@ -1,0 +1,1 @@
+"""Markers that show goals in pictures; sensors see none of them."""

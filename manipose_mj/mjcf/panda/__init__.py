@@ -1,0 +1,1 @@
+"""The Franka Panda: kinematics, collision geometry, MJCF model, composer entity."""

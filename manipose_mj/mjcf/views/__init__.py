@@ -1,0 +1,1 @@
+"""Films, thumbnails, contact sheets and the interactive viewer."""

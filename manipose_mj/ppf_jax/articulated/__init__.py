@@ -1,0 +1,1 @@
+"""The estimator of handles and joints: network, voting, fits."""

@@ -1,0 +1,1 @@
+"""CPPF as published (You et al. 2022), which tables compare with."""

@@ -1,0 +1,1 @@
+"""Rendered views of objects for training and evaluation."""

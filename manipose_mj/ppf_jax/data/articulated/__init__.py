@@ -1,0 +1,1 @@
+"""Rendered views of furniture for training and evaluation."""

@@ -1,0 +1,70 @@
+"""Clouds of built assets, such as real scans, which nothing is trained on."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.visible_shapes import surface, visible_shapes
+from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.data.rendering import Subject, render_clouds
+from manipose_mj.ppf_jax.data.view_settings import ViewSetting
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+
+
+def asset_clouds(
+    directory: Path, name: str, setting: ViewSetting, *, views: int, jobs: int = 1
+) -> list[LabelledCloud]:
+    """Views of the rigid assets in a folder that are of a category or a type.
+
+    Args:
+      directory: Of asset folders.
+      name: A category, or a labelling rule such as `"axial"`.
+      setting: From where, and how well; without occluders.
+      views: Of each asset.
+      jobs: Processes.
+
+    Raises:
+      InputError: There is no such asset in the folder, or one cannot be read.
+    """
+    chosen = [
+        asset
+        for asset in map(read_asset, list_assets(directory))
+        if asset.kind == "rigid" and name in (asset.category, asset.label.object_type)
+    ]
+    if not chosen:
+        raise InputError(f"{directory}: no rigid asset of category or type {name!r}")
+    rendered = joblib.Parallel(n_jobs=jobs)(
+        joblib.delayed(views_of)(asset, setting, views) for asset in chosen
+    )
+    return [cloud for clouds in rendered for cloud in clouds]  # pyright: ignore[reportOptionalIterable, reportGeneralTypeIssues]
+
+
+def asset_subject(asset: Asset) -> Subject:
+    """A built rigid asset, ready to be rendered.
+
+    Raises:
+      InputError: Its model or a mesh cannot be read.
+    """
+    return Subject.of_mesh(
+        surface(visible_shapes(asset.folder)),
+        asset.label,
+        name=asset.name,
+        category=asset.category,
+        rests=[(pose.rotation, pose.height, pose.probability) for pose in asset.stable_poses],
+    )
+
+
+def views_of(asset: Asset, setting: ViewSetting, views: int) -> list[LabelledCloud]:
+    """Views of one asset, the same whenever it is rendered; without occluders.
+
+    Raises:
+      InputError: Its model or a mesh cannot be read, or it cannot be seen in this setting.
+    """
+    rng = np.random.default_rng(zlib.crc32(asset.name.encode()))
+    return render_clouds(asset_subject(asset), setting, views, rng)

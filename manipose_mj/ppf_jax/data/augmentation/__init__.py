@@ -1,0 +1,1 @@
+"""Changes to training clouds: outliers, swapped parts, stretching, tapering."""

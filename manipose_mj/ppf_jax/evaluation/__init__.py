@@ -1,0 +1,1 @@
+"""Estimates over sets of clouds, and how far they are from the truth."""

@@ -1,0 +1,1 @@
+"""Point clouds: files, normals, symmetric labels, batches."""

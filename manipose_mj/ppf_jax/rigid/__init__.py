@@ -1,0 +1,1 @@
+"""The estimator of rigid objects: pair features, network, voting, refinement."""

@@ -1,0 +1,142 @@
+"""Files of trained weights: half-precision arrays and the configuration that gives them their shapes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_type_hints
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.articulated.model import ArticulatedConfig, ArticulatedModel
+from manipose_mj.ppf_jax.cppf.model import CppfModel
+from manipose_mj.ppf_jax.cppf.voting import CppfConfig
+from manipose_mj.ppf_jax.rigid.model import EstimatingModel, ModelConfig, PoseModel
+from manipose_mj.storage.staging import staging
+
+FORMAT_VERSION = 2  # of the configuration's names and of the arrays' order
+_HEADER = "header"
+MethodName: TypeAlias = Literal["ours", "cppf"]
+LabelSet: TypeAlias = Literal["unified", "original"]
+
+
+@dataclass(frozen=True)
+class TrainedModel:
+    """A model and what it was trained on.
+
+    Attributes:
+      model: The networks.
+      categories: Of the objects it was trained on.
+      labels: What it was trained to find: unified labels, or the frames of the objects' sources.
+    """
+
+    model: EstimatingModel
+    categories: tuple[str, ...]
+    labels: LabelSet = "unified"
+
+    @property
+    def method(self) -> MethodName:
+        """Whose model it is."""
+        return next(name for name, (build, _) in _KINDS.items() if type(self.model) is build)  # pyright: ignore[reportReturnType]
+
+
+def save_weights(path: Path, trained: TrainedModel) -> None:
+    """Write a model to a file, whole or not at all."""
+    header = {
+        "format": FORMAT_VERSION,
+        "categories": trained.categories,
+        "kind": trained.method,
+        "labels": trained.labels,
+        "config": dataclasses.asdict(trained.model.config),
+    }
+    leaves = jax.tree.leaves(trained.model)
+    arrays: dict[str, Any] = {
+        f"leaf_{i:03d}": np.asarray(leaf, np.float16) for i, leaf in enumerate(leaves)
+    }
+    arrays[_HEADER] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as scratch, open(scratch, "wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def load_weights(path: Path) -> TrainedModel:
+    """Read a model.
+
+    Raises:
+      InputError: The file is missing, truncated, of another version or no file of weights at all.
+    """
+    try:
+        with np.load(path) as stored:
+            header = json.loads(bytes(stored[_HEADER]))
+            arrays = [stored[name] for name in sorted(stored.files) if name != _HEADER]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file of weights") from None
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error):
+        raise InputError(
+            f"{path}: not a whole file of weights; copy it again or train again"
+        ) from None
+    if header.get("format") != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: weights of format {header.get('format')}; this version reads "
+            f"{FORMAT_VERSION}: train again or install the version that wrote them"
+        )
+    if header.get("kind") not in _KINDS:
+        raise InputError(
+            f"{path}: weights of method {header.get('kind')!r}; this version knows {', '.join(_KINDS)}"
+        )
+    try:
+        build, config = _KINDS[header["kind"]]
+        blank = build(_config(config, header["config"]), rng=np.random.default_rng(0))
+        shapes, structure = jax.tree.flatten(blank)
+        if [leaf.shape for leaf in shapes] != [array.shape for array in arrays]:
+            raise ValueError("shapes")
+        categories = tuple(header["categories"])
+        labels = header["labels"]
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: the weights do not fit their configuration; train again"
+        ) from None
+    model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
+    return TrainedModel(model, categories, labels)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A scratch path that takes the place of `path` at once when all went well."""
+    with staging(path) as folder:
+        scratch = folder / path.name
+        yield scratch
+        os.replace(scratch, path)
+
+
+def _config(kind: Any, stored: dict[str, Any]) -> Any:
+    """A dataclass from what `dataclasses.asdict` made of it, after JSON, which has no tuples.
+
+    Raises:
+      KeyError: It has no such field.
+      TypeError: It lacks a field.
+    """
+    types = get_type_hints(kind)
+    values = {}
+    for name, value in stored.items():
+        if dataclasses.is_dataclass(types[name]):
+            value = _config(types[name], value)
+        values[name] = tuple(value) if isinstance(value, list) else value
+    return kind(**values)
+
+
+_KINDS: dict[str, tuple[Callable[..., Any], type]] = {
+    "ours": (PoseModel, ModelConfig),
+    "cppf": (CppfModel, CppfConfig),
+    "articulated": (ArticulatedModel, ArticulatedConfig),
+}

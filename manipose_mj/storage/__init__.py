@@ -1,0 +1,1 @@
+"""Cache folders, files and folders written whole, and hashes of source code."""

@@ -1,0 +1,31 @@
+"""Files of the clouds' cache, which any number of processes write at the same time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from manipose_mj.errors import InputError
+from manipose_mj.storage.cache_root import CACHE_VARIABLE
+from manipose_mj.storage.staging import staging
+
+
+@contextmanager
+def new_cache_file(path: Path) -> Iterator[Path]:
+    """Where to write a file, which is moved to `path` at once when it is whole.
+
+    Raises:
+      InputError: The cache cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with staging(path) as scratch:
+            yield scratch / path.name
+            os.replace(scratch / path.name, path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
+            f"set {CACHE_VARIABLE} to a folder with room that can be written"
+        ) from None

@@ -1,0 +1,1 @@
+"""The family `articulated`: open, close, store into and take out of furniture."""

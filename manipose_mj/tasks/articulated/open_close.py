@@ -1,0 +1,74 @@
+"""`articulated/open_*` and `articulated/close_*`: move one drawer or door, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manipose_mj.assets.asset import Asset
+from manipose_mj.errors import unknown_name
+from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion, Standing
+from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
+from manipose_mj.tasks.articulated.part_choice import PartChoice
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.preview import Preview
+from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.goals import Goal, OpenGoal, ShutGoal
+
+
+@dataclass(frozen=True)
+class OpenCloseConfig(TaskConfig):
+    """Attributes: requested: what shall become of the part; fraction: of its joint's range that counts
+    as open, or as shut; start_open: how far open it is when it is to be closed, of its range;
+    standing: where the furniture stands."""
+
+    horizon: float = 40.0
+    requested: Literal["open", "shut"] = "open"
+    fraction: float = 0.9
+    start_open: tuple[float, float] = (0.6, 1.0)
+    standing: Standing = Standing()
+
+
+class OpenClose(FurnitureTask):
+    """Open a shut drawer or door, or shut an open one.
+
+    Success: the joint is open, or shut, by the fraction of its range that the configuration says.
+    """
+
+    def __init__(
+        self,
+        furniture: Sequence[Asset],
+        choice: PartChoice,
+        env_config: EnvConfig,
+        config: OpenCloseConfig | None = None,
+    ) -> None:
+        self.task_config = config or OpenCloseConfig()
+        super().__init__(self.task_config, env_config)
+        self.pieces = FurnitureInQuestion(
+            self.scene, furniture, choice, self.task_config.standing, hollow=False
+        )
+
+    def sample(
+        self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
+    ) -> EpisodeStart:
+        config = self.task_config
+        piece = self._choose(rng, spec.object)
+        opening = float(rng.uniform(*config.start_open)) if config.requested == "shut" else 0.0
+        part = self.pieces.parts[piece].name
+        goal: Goal = (
+            OpenGoal(part, config.fraction)
+            if config.requested == "open"
+            else ShutGoal(part, config.fraction)
+        )
+        return EpisodeStart(goals=(goal,), furniture=(self.pieces.sample(rng, piece, opening),))
+
+    def _choose(self, rng: np.random.RandomState, name: str | None) -> int:
+        names = [entity.asset.name for entity in self.pieces.entities]
+        if name is None:
+            return int(rng.randint(len(names)))
+        if name not in names:
+            raise unknown_name("object", name, names)
+        return names.index(name)

@@ -1,0 +1,97 @@
+"""`articulated/take_out_*`: open a drawer or door, bring an object out onto the table, shut it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipose_mj.assets.asset import Asset
+from manipose_mj.mjcf.markers.goal_area import GoalArea
+from manipose_mj.poses import compose
+from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
+from manipose_mj.tasks.articulated.furniture import Standing
+from manipose_mj.tasks.articulated.part_choice import PartChoice
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.preview import Preview
+from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.goals import ShutGoal, TakenOutGoal
+
+
+@dataclass(frozen=True)
+class TakeOutConfig(TaskConfig):
+    """Attributes: standing: where the furniture stands; x_range, y_range: where the middle of the
+    goal area may be [m], y mirrored for doors hinged on the right; area: half its sides [m];
+    front: how far from the cavity's open side the object may lie [m]; room: between it and the
+    walls, where there is that much, and other objects [m]; max_fillers: how many other
+    objects may lie in the cavity; shut: by which fraction of its range a door must be shut in the
+    end; None: to within the tolerance, as a drawer."""
+
+    horizon: float = 90.0
+    standing: Standing = Standing()
+    x_range: tuple[float, float] = (0.36, 0.46)
+    y_range: tuple[float, float] = (-0.40, -0.30)
+    area: tuple[float, float] = (0.08, 0.08)
+    front: float = 0.02
+    room: float = 0.035
+    max_fillers: int = 0
+    shut: float | None = None
+
+
+class TakeOut(CavityTask):
+    """Open the part, take the object out, set it down in the marked area, shut the part.
+
+    Success: the object is out of the cavity, rests on the table in the goal area, released, and the
+    part is shut.
+    """
+
+    def __init__(
+        self,
+        objects: Sequence[Asset],
+        furniture: Sequence[Asset],
+        choice: PartChoice,
+        env_config: EnvConfig,
+        config: TakeOutConfig | None = None,
+    ) -> None:
+        """Raises InputError where an object fits no cavity, or a part has none."""
+        self.task_config = config or TakeOutConfig()
+        super().__init__(
+            objects,
+            furniture,
+            choice,
+            self.task_config,
+            env_config,
+            standing=self.task_config.standing,
+            max_fillers=self.task_config.max_fillers,
+            taken=True,
+        )
+        self.scene.add_fixture("goal", GoalArea(half_sides=self.task_config.area))
+
+    @property
+    def observed_goals(self) -> tuple[str, ...]:
+        return ("goal",)
+
+    def sample(
+        self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
+    ) -> EpisodeStart:
+        config = self.task_config
+        furniture, index = self.sample_furniture_and_object(rng, spec)
+        piece = furniture.index
+        center = self.sample_place(rng, piece, config.x_range, config.y_range)
+        placement, inside = self.placement.inside(
+            rng, piece, index, front=config.front, room=config.room
+        )
+        fillers = self.sample_fillers(rng, piece, index, placement)
+        cavity = self.cavity_of(preview, furniture)
+        part = self.pieces.parts[piece].name
+        return EpisodeStart(
+            goals=(
+                TakenOutGoal("object", part, center, np.array(config.area)),
+                ShutGoal(part, config.shut),
+            ),
+            objects=placed_objects(index, cavity @ inside, fillers, cavity),
+            furniture=(furniture,),
+            # The middle of the goal area, Z up.
+            fixtures={"goal": compose(np.eye(3), np.array([*center, 0.0]))},
+        )

@@ -1,0 +1,1 @@
+"""The family `clutter`: objects picked out of piles."""

@@ -1,0 +1,1 @@
+"""What all tasks share: configuration, contract, starts of episodes, environment, registry, randomisation, snapshots."""

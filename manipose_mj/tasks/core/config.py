@@ -1,0 +1,115 @@
+"""What an environment is, what an episode is, and what a task fixes about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+from manipose_mj.actions import CONTROL_MODES
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.categories import SPLITS, Split
+from manipose_mj.errors import unknown_name
+from manipose_mj.tasks.core.object_selection import select_assets
+from manipose_mj.tasks.core.randomisation import STRENGTHS
+from manipose_mj.tasks.goals import RewardMode, Tolerance
+from manipose_mj.tasks.observations.sensor_config import SensorConfig
+from manipose_mj.tasks.observations.sensors import parse_modes
+
+REWARD_MODES: tuple[RewardMode, ...] = ("sparse", "dense")
+PRIMITIVE = "primitive"
+Objects = Sequence[Asset | str | Path]
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """What an environment is; every front door makes one of these.
+
+    Attributes:
+      task: `"domain/name"`.
+      obs_mode: Any `+` combination of observation modes, such as `"state+pose+pointcloud"`.
+      control_mode: What actions mean, such as `"pd_joint_pos"`, `"pd_ee_delta_pose"` or `"primitive"`; the
+        physics is the same for all.
+      reward_mode: `"sparse"`, 1 while the goals are met; or `"dense"`, in [0, 1].
+      objects: Objects to use instead of the built-in ones: assets, names of built-in objects, asset folders,
+        or folders of asset folders.
+      split: Which built-in objects; train and test objects have nothing in common.
+      randomisation: Name of a strength of domain randomisation.
+      sensors: Cameras, images, clouds and their noise.
+
+    Raises:
+      InputError: A mode, split or strength is unknown; the nearest names are offered.
+    """
+
+    task: str
+    obs_mode: str = "state+pose"
+    control_mode: str = "pd_joint_pos"
+    reward_mode: RewardMode = "sparse"
+    objects: Objects | None = None
+    split: Split = "train"
+    randomisation: str = "none"
+    sensors: SensorConfig = SensorConfig()
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("control mode", self.control_mode, (*CONTROL_MODES, PRIMITIVE)),
+            ("reward mode", self.reward_mode, REWARD_MODES),
+            ("split", self.split, SPLITS),
+            ("randomisation", self.randomisation, STRENGTHS),
+        ):
+            if value not in known:
+                raise unknown_name(what, value, known)
+        parse_modes(self.obs_mode)
+        chosen: Any = self.objects
+        if chosen is not None:
+            one = isinstance(chosen, str | Path | Asset)
+            object.__setattr__(self, "objects", (chosen,) if one else tuple(chosen))
+
+    def assets(self) -> tuple[Asset, ...] | None:
+        """The objects chosen, loaded; None where the task shall use the built-in ones.
+
+        Raises:
+          InputError: There is no built-in object or asset folder of a name.
+        """
+        return None if self.objects is None else select_assets(self.objects)
+
+
+class EnvOptions(TypedDict, total=False):
+    """The fields of `EnvConfig` but for the task, as keywords of the front doors."""
+
+    obs_mode: str
+    control_mode: str
+    reward_mode: RewardMode
+    objects: Objects | None
+    split: Split
+    randomisation: str
+    sensors: SensorConfig
+
+
+@dataclass(frozen=True)
+class EpisodeSpec:
+    """What an episode is, within an environment.
+
+    Attributes:
+      seed: From which all that is random about it follows; None goes on from the episode before.
+      object: Name of the asset that it shall be about, one of the environment's; None draws one.
+    """
+
+    seed: int | None = None
+    object: str | None = None
+
+
+@dataclass(frozen=True)
+class TaskConfig:
+    """What every task fixes; its own configuration adds to this.
+
+    Attributes:
+      tolerance: What counts as success.
+      horizon: Time limit of an episode [s].
+      settle: Time that objects have to come to rest before an episode starts [s].
+    """
+
+    tolerance: Tolerance = Tolerance()
+    horizon: float = 60.0
+    settle: float = 0.3

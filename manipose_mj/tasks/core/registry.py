@@ -1,0 +1,124 @@
+"""Named tasks: factories with tags, looked up by domain and task name."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from manipose_mj.errors import unknown_name
+from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.task import ManipulationTask
+
+
+class TaskFactory(Protocol):
+    """Builds a task from what its user chose."""
+
+    def __call__(self, env_config: EnvConfig) -> ManipulationTask: ...
+
+
+@dataclass(frozen=True)
+class TaskSpec:
+    """One registered task: its names, its factory, tags, and one line on what it asks for."""
+
+    domain: str
+    name: str
+    factory: TaskFactory
+    tags: tuple[str, ...]
+    summary: str
+
+    @property
+    def full_name(self) -> str:
+        """`domain/name`."""
+        return f"{self.domain}/{self.name}"
+
+    @property
+    def description(self) -> str:
+        """What the factory's docstring says after its first line, for the task's card; may be empty."""
+        _, _, rest = inspect.cleandoc(self.factory.__doc__ or "").partition("\n")
+        return rest.strip()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By name, for factories that are closures; a worker's process must register the task first.
+        return _registered, (self.factory.__module__, self.domain, self.name)
+
+
+def _registered(module: str, domain: str, name: str) -> TaskSpec:
+    importlib.import_module(module)
+    return task_spec(domain, name)
+
+
+_TASKS: dict[tuple[str, str], TaskSpec] = {}
+_listeners: list[Callable[[TaskSpec], None]] = []
+
+
+def register_task(
+    domain: str, name: str, *, tags: tuple[str, ...] = ()
+) -> Callable[[TaskFactory], TaskFactory]:
+    """Register the decorated factory as `domain/name`: for this package's tasks and for anybody's.
+
+    Every front door then knows the task: `suite.load` and `suite.ALL_TASKS`; `dm_control.suite` after
+    `register_suite()`; Gymnasium after `import manipose_mj.gym`; and the command line, in a process
+    that imports the module of the factory.
+
+    Args:
+      domain: The family.
+      name: Lower case words joined by `_`, of which the Gymnasium id is made.
+      tags: For `dm_control.suite`'s subsets.
+
+    The first line of the factory's docstring is the summary that `manipose list` shows; the rest goes
+    to the task's card.
+
+    Raises:
+      ValueError: The name is taken, or the factory has no docstring.
+    """
+
+    def decorate(factory: TaskFactory) -> TaskFactory:
+        if (domain, name) in _TASKS:
+            raise ValueError(f"task {domain}/{name} is registered already")
+        if not factory.__doc__:
+            raise ValueError(f"the factory of {domain}/{name} needs a docstring")
+        summary = factory.__doc__.strip().splitlines()[0]
+        spec = TaskSpec(domain, name, factory, tags, summary)
+        for listener in _listeners:
+            listener(spec)
+        _TASKS[domain, name] = spec
+        return factory
+
+    return decorate
+
+
+def on_registration(listener: Callable[[TaskSpec], None]) -> None:
+    """Tell the listener of every task that is registered, and of each that will be; once only."""
+    if listener not in _listeners:
+        for spec in _TASKS.values():
+            listener(spec)
+        _listeners.append(listener)
+
+
+def all_tasks() -> tuple[tuple[str, str], ...]:
+    """Every registered `(domain, name)`, in the order of registration."""
+    return tuple(_TASKS)
+
+
+def named_task(full_name: str) -> TaskSpec:
+    """The registered task of a name such as `"single_object/target_pose"`.
+
+    Raises:
+      InputError: There is none; the nearest names are offered.
+    """
+    domain, _, name = full_name.partition("/")
+    return task_spec(domain, name)
+
+
+def task_spec(domain: str, name: str) -> TaskSpec:
+    """The registered task.
+
+    Raises:
+      InputError: There is none; the nearest names are offered.
+    """
+    if (domain, name) not in _TASKS:
+        raise unknown_name("task", f"{domain}/{name}", (s.full_name for s in _TASKS.values()))
+    return _TASKS[domain, name]

@@ -1,0 +1,177 @@
+"""Saving an episode at any step and going on from there, bit for bit."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from dm_control import composer
+from jaxtyping import Float
+
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.task import ManipulationTask
+
+# What an episode may change in a model: where fixed things stand, who has weight, randomisation.
+_MODEL_FIELDS = (
+    "body_pos",
+    "body_quat",
+    "body_ipos",
+    "body_iquat",
+    "body_mass",
+    "body_inertia",
+    "body_subtreemass",
+    "body_invweight0",
+    "body_gravcomp",
+    "geom_friction",
+    "geom_solref",
+    "geom_rgba",
+    "geom_matid",
+    "mat_rgba",
+    "dof_damping",
+    "dof_frictionloss",
+    "dof_invweight0",
+    "dof_M0",
+    "actuator_gainprm",
+    "actuator_biasprm",
+    "light_pos",
+    "light_dir",
+    "light_diffuse",
+    "light_ambient",
+    "light_specular",
+    "cam_pos",
+    "cam_quat",
+    "cam_fovy",
+)
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_ASLEEP = (
+    "tree_asleep",
+    "tree_awake",
+    "body_awake",
+    "body_awake_ind",
+    "parent_awake_ind",
+    "dof_awake_ind",
+)
+_AWAKE_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
+# What the second half of the last step computed, which observations show; and the servos' speeds, which
+# dm_control leaves at zero when it resets.
+_LEFT_BEHIND = ("actuator_velocity", "actuator_force", "qacc", "sensordata")
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All that the rest of an episode depends on; arrays and plain values, so it can be pickled.
+
+    Attributes:
+      state: MuJoCo's integration state.
+      model: Fields of the model that an episode may change.
+      asleep: Which bodies are asleep, and how long the others have rested.
+      awake: How many are not.
+      left_behind: What the last step computed on its way.
+      memory: What the control mode remembers.
+      task: What the task remembers of this episode.
+      random_state: Of the environment's one generator.
+      ended: Whether the episode was over.
+    """
+
+    state: Float[np.ndarray, "n"]
+    model: dict[str, np.ndarray]
+    asleep: dict[str, np.ndarray]
+    awake: dict[str, int]
+    left_behind: dict[str, np.ndarray]
+    memory: Float[np.ndarray, "m"]
+    task: dict[str, Any]
+    random_state: Any
+    ended: bool
+
+
+def save(environment: composer.Environment) -> Snapshot:
+    """The environment's present, between two steps.
+
+    Raises:
+      InputError: It has not been reset yet.
+    """
+    task, model, data = _parts(environment)
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    return Snapshot(
+        state=state,
+        model={name: np.array(getattr(model, name)) for name in _MODEL_FIELDS},
+        asleep={name: np.array(getattr(data, name)) for name in _ASLEEP},
+        awake={name: int(getattr(data, name)) for name in _AWAKE_COUNTS},
+        left_behind={name: np.array(getattr(data, name)) for name in _LEFT_BEHIND},
+        memory=task.control_mode.memory(),
+        task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
+        random_state=environment.random_state.get_state(),
+        ended=environment._reset_next_step,
+    )
+
+
+def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, np.ndarray]:
+    """Put an environment of the same task, options and objects back; what follows is the same.
+
+    Returns:
+      The observation of that moment.
+
+    Raises:
+      InputError: The environment has not been reset yet, or its model is another one.
+    """
+    task, model, data = _parts(environment)
+    expected = mujoco.mj_stateSize(model, _STATE)
+    shapes = {name: getattr(model, name).shape for name in _MODEL_FIELDS}
+    if len(snapshot.state) != expected or any(
+        snapshot.model[name].shape != shape for name, shape in shapes.items()
+    ):
+        raise InputError(
+            f"snapshot of {len(snapshot.state)} state values; this environment has {expected}: "
+            "restore it in one of the same task, options and objects"
+        )
+    for name, values in snapshot.model.items():
+        getattr(model, name)[:] = values
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_setState(model, data, snapshot.state, _STATE)
+    # Who sleeps is no part of MuJoCo's state: bodies that do are not moved, so all are put in place first.
+    mujoco.mj_forward(model, data)
+    for name, values in snapshot.asleep.items():
+        getattr(data, name)[:] = values
+    for name, count in snapshot.awake.items():
+        setattr(data, name, count)
+    mujoco.mj_setState(model, data, snapshot.state, _STATE)
+    # The first half of a step: what dm_control leaves behind after each.
+    mujoco.mj_step1(model, data)
+    for name, values in snapshot.left_behind.items():
+        getattr(data, name)[:] = values
+    task.__dict__.update(copy.deepcopy(snapshot.task))
+    task.control_mode.remember(snapshot.memory)
+    task.forget_images()
+    updater = environment._observation_updater
+    environment.random_state.set_state(snapshot.random_state)
+    updater.reset(environment.physics, environment.random_state)
+    # Observations may have drawn noise.
+    environment.random_state.set_state(snapshot.random_state)
+    environment._reset_next_step = snapshot.ended
+    return updater.get_observation()
+
+
+def _parts(
+    environment: composer.Environment,
+) -> tuple[ManipulationTask, mujoco.MjModel, mujoco.MjData]:
+    task = environment.task
+    if not isinstance(task, ManipulationTask):
+        raise InputError(f"{type(task).__name__} is no task of this package; it cannot be saved")
+    if environment._mjcf_never_compiled:
+        raise InputError("the environment has not been reset yet; call reset() first")
+    return task, environment.physics.model.ptr, environment.physics.data.ptr
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether it is data: what an episode leaves in a task, not the scene's elements."""
+    if value is None or isinstance(value, (bool, int, float, str, np.ndarray, np.generic)):
+        return True
+    if isinstance(value, (tuple, list)):
+        return all(_is_plain(v) for v in value)
+    if isinstance(value, dict):
+        return all(isinstance(k, str) and _is_plain(v) for k, v in value.items())
+    return is_dataclass(value) and all(_is_plain(v) for v in vars(value).values())

@@ -1,0 +1,76 @@
+"""How an episode starts, as arrays: drawn from random numbers alone, then written into a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.tasks.goals import Goal
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A rigid object in play.
+
+    Attributes:
+      index: Which of the scene's objects.
+      pose: `T_world_object`.
+    """
+
+    index: int
+    pose: Float[np.ndarray, "4 4"]
+
+
+@dataclass(frozen=True)
+class PlacedFurniture:
+    """An articulated object in play.
+
+    Attributes:
+      index: Which of the scene's articulated objects.
+      position: `(3,)`, of its frame in the world [m].
+      quaternion: `(4,)`, `wxyz`.
+      openings: Joint positions [m or rad] by the names of parts; all others are shut.
+    """
+
+    index: int
+    position: Float[np.ndarray, "3"]
+    quaternion: Float[np.ndarray, "4"]
+    openings: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelChanges:
+    """What domain randomisation makes of the compiled model for one episode.
+
+    Attributes:
+      fields: Arrays of `mujoco.MjModel` by name, whole; none: the model as it was compiled.
+      latency: By how much servo targets come late [s].
+    """
+
+    fields: Mapping[str, np.ndarray] = field(default_factory=dict)
+    latency: float = 0.0
+
+
+@dataclass(frozen=True)
+class EpisodeStart:
+    """Everything that is random about an episode.
+
+    Attributes:
+      goals: What the episode wants, all of it.
+      objects: Rigid objects in play, by the names that goals use; the first is what the episode is about.
+      furniture: Articulated objects in play.
+      fixtures: `T_world_fixture` of the scene's fixtures, goal markers among them, by name; those not
+        named are out of sight.
+      model: Changes of the model.
+      noise_seed: Of the sensors.
+    """
+
+    goals: tuple[Goal, ...]
+    objects: Mapping[str, PlacedObject] = field(default_factory=dict)
+    furniture: tuple[PlacedFurniture, ...] = ()
+    fixtures: Mapping[str, Float[np.ndarray, "4 4"]] = field(default_factory=dict)
+    model: ModelChanges = ModelChanges()
+    noise_seed: int = 0

@@ -1,0 +1,1 @@
+"""Observation modes: poses, clouds, images, and the cameras behind them."""

@@ -1,0 +1,7 @@
+"""The registered tasks; importing this registers them."""
+
+from manipose_mj.tasks.articulated import registered as articulated
+from manipose_mj.tasks.clutter import registered as clutter
+from manipose_mj.tasks.single_object import registered as single_object
+
+__all__ = ["articulated", "clutter", "single_object"]

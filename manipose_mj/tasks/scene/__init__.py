@@ -1,0 +1,1 @@
+"""The scene's state as arrays, its reader, and where objects wait and rest."""

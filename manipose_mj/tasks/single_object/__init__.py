@@ -1,0 +1,1 @@
+"""The family `single_object`: one object to a goal pose, also at a shelf."""

@@ -1,0 +1,39 @@
+"""`manipose view` with a window that only counts: no display is needed to test it."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import pytest
+
+from manipose_mj.cli.main import main
+
+
+class Window(nullcontext):
+    """Shuts after five pictures."""
+
+    def __init__(self, data) -> None:
+        super().__init__(self)
+        self.data, self.times = data, []
+
+    def is_running(self) -> bool:
+        return len(self.times) < 5
+
+    def lock(self):
+        return nullcontext()
+
+    def sync(self) -> None:
+        self.times.append(self.data.time)
+
+
+def test_the_window_shows_a_running_task(monkeypatch):
+    windows = []
+
+    def opened(model, data):
+        windows.append(Window(data))
+        return windows[-1]
+
+    monkeypatch.setattr("manipose_mj.mjcf.views.viewer.require_display", lambda: None)
+    monkeypatch.setattr("manipose_mj.mjcf.views.viewer.open_viewer", opened)
+    assert main(["view", "single_object/target_pose", "--objects", "mug_000", "--seed", "3"]) == 0
+    assert windows[0].times == pytest.approx([0.02, 0.04, 0.06, 0.08, 0.1])

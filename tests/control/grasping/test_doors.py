@@ -1,0 +1,141 @@
+"""Drawers and doors: the hand follows the handle's arc, turning about it, and pushes objects shut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manipose_mj import suite
+from manipose_mj.control.baseline import Baseline
+from manipose_mj.control.grasping.handle_grasps import (
+    Push,
+    grip_now,
+    grips,
+    opening_pushes,
+    shutting_pushes,
+)
+from manipose_mj.control.grasping.part_motion import PartWay, find_way
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.articulation import joint_motion
+from manipose_mj.control.scene.cavity_mouth import outwards, way_out
+from manipose_mj.control.scene.planning_scene import PlanningScene
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
+from manipose_mj.evaluation.episode import run_episode
+from manipose_mj.poses import invert, rotation_angle
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+
+# Seeds for which the baseline, with true poses, is known to do it.
+SOLVED = {
+    "open_cabinet_door": 0,
+    "open_oven": 1,
+    "open_bottom_drawer": 0,
+    "close_microwave": 0,
+    "close_oven": 0,
+    "close_top_drawer": 0,
+    "store_microwave": 1,
+    "take_out_oven": 0,
+}
+
+
+@pytest.fixture(scope="module", params=["open_cabinet_door", "open_oven"])
+def scene(request) -> tuple[MotionPlanner, SceneEstimate, PartEstimate]:
+    environment = suite.load("articulated", request.param, seed=0, obs_mode="state")
+    environment.reset()
+    baseline = Baseline(environment)
+    estimate = baseline.perception.observe()
+    planner = MotionPlanner(estimate.scene, baseline._arm, 0.02, np.random.default_rng(0))
+    return planner, estimate, estimate.parts[environment.task.part.name]
+
+
+def _way(scene, hold, opening: float, part: PartEstimate | None = None) -> PartWay | None:
+    planner, estimate, own = scene
+    return find_way(planner, part or own, hold, opening, near=estimate.joints)
+
+
+@pytest.mark.sample(1)
+def test_a_gripped_handle_is_led_along_its_arc(scene):
+    planner, _, part = scene
+    goal = part.joint.range[0] + 0.9 * np.ptp(part.joint.range)
+    ways = [way for hold in grips(part) if (way := _way(scene, hold, goal)) is not None]
+    way = max(ways, key=lambda way: way.openings[-1])
+    assert way.openings[-1] == pytest.approx(goal)
+    for joints, opening, tilt in list(zip(way.joints, way.openings, way.tilts, strict=True))[::5]:
+        moved = part.base_pose @ joint_motion(part, float(opening))
+        requested = moved @ way.hold.tcp_poses(np.array([tilt]))[0]
+        reached = planner.tcp_pose(joints)
+        assert np.linalg.norm(reached[:3, 3] - requested[:3, 3]) < 1e-3
+        assert rotation_angle(reached[:3, :3], requested[:3, :3]) < 5e-3
+        # Wherever it tilts, the hand stays on the bar.
+        on_bar = invert(moved @ part.handle.pose) @ reached
+        assert np.linalg.norm(on_bar[1:3, 3]) < 1e-3
+    targets = way.targets(0.02)
+    assert np.abs(np.diff(targets, axis=0)).max() < 0.06
+    np.testing.assert_allclose(targets[-1], way.joints[-1], atol=1e-6)
+
+
+def test_the_hold_of_now_is_the_grip_it_came_from(scene):
+    _, _, part = scene
+    for hold in list(grips(part))[:2]:
+        for tilt in (-0.5, 0.0, 0.7):
+            tcp = part.pose @ hold.tcp_poses(np.array([tilt]))[0]
+            now, angle = grip_now(part, tcp, 0.01)
+            assert angle == pytest.approx(tilt, abs=1e-6)
+            np.testing.assert_allclose(now.upright, hold.upright, atol=1e-9)
+
+
+def test_pushes_press_from_the_side_that_moves_the_part(scene):
+    planner, _, part = scene
+    low, high = part.joint.range
+    half_open = replace(part, opening=0.5 * (low + high))
+    pairs = ((shutting_pushes(part), -1.0), (opening_pushes(planner, half_open), 1.0))
+    for pushes, sign in pairs:
+        for push in list(pushes)[:6]:
+            assert isinstance(push, Push)
+            velocity = np.cross(part.joint.axis, push.point - part.joint.origin)
+            assert sign * float(-push.normal @ velocity) > 0
+            tcp = push.tcp_poses(np.array([0.0]))[0]
+            np.testing.assert_allclose(tcp[:3, 2], -push.normal, atol=1e-9)
+            assert 0.005 < (tcp[:3, 3] - push.point) @ push.normal < 0.012  # the tips touch
+
+
+def test_a_way_that_is_blocked_ends_before_the_obstacle(scene, monkeypatch):
+    planner, _, part = scene
+    low, high = part.joint.range
+    at = low + 0.5 * (high - low)
+    free = PlanningScene.first_collision
+    address = planner.scene.collision_model.joint_address(part.body)
+
+    def collides(self, joints, query=None):
+        opening = self.positions.qpos[address]
+        return ("wall", "arm", -0.01) if opening > at else free(self, joints, query)
+
+    monkeypatch.setattr(PlanningScene, "first_collision", collides)
+    ways = [_way(scene, hold, high) for hold in list(grips(part))[:2]]
+    ends = [way.openings[-1] for way in ways if way is not None]
+    assert ends and all(low < end <= at for end in ends)
+
+
+def test_the_way_out_of_a_cavity_behind_a_door_is_through_its_mouth(scene):
+    _, estimate, part = scene
+    assert part.cavity is not None
+    inside = (part.base_pose @ np.append(part.cavity.center, 1.0))[:3]
+    way = way_out(estimate, inside)
+    assert way is not None and abs(way[2]) < 1e-9
+    local = part.base_pose[:3, :3].T @ way
+    assert local @ outwards(part) == pytest.approx(np.linalg.norm(way))
+    after = inside + way
+    moved = (invert(part.base_pose) @ np.append(after, 1.0))[:3] - part.cavity.center
+    assert (np.abs(moved) > part.cavity.extents / 2).any()
+    assert way_out(estimate, inside + [0.0, 0.0, 2.0]) is None
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("task", SOLVED)
+def test_the_baseline_does_it(task):
+    result, _ = run_episode(
+        EnvConfig(f"articulated/{task}", obs_mode="state"), EpisodeSpec(SOLVED[task])
+    )
+    assert result.success_at_end, (result.failure, result.reason)
+    assert result.max_penetration < 0.003

@@ -1,0 +1,103 @@
+"""Plans in clutter: what lies on a target goes first, aside, to free places; then the target."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipose_mj import suite
+from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter, is_supported
+from manipose_mj.control.planning.table_places import is_free
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation import episode
+from manipose_mj.poses import compose, invert
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.goals import PoseGoal
+
+SEED = 1
+
+
+@pytest.fixture(scope="module")
+def stacked():
+    """Environment, perception and planner of one stack."""
+    environment = suite.load("clutter", "stacked", seed=SEED, obs_mode="state")
+    environment.random_state.seed(SEED)
+    environment.reset()
+    task = environment.task
+    arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
+    perception = OraclePerception(task, environment.physics)
+    scene = perception.observe().scene
+    return environment, perception, MotionPlanner(scene, arm, 0.02, np.random.default_rng(0))
+
+
+def _target_goal(task) -> PoseGoal:
+    return next(goal for goal in task.goals if isinstance(goal, PoseGoal))
+
+
+def test_what_lies_on_the_target_goes_first_and_aside(stacked):
+    environment, perception, planner = stacked
+    task, estimate = environment.task, perception.observe()
+    assert in_clutter(task.goals, estimate)
+    grasp, move, release = next(candidate_moves(task.goals, estimate, planner)).steps()
+    assert [s.primitive for s in (grasp, move, release)] == ["grasp_at", "move_to", "release"]
+    assert grasp.subject == move.subject == release.subject != "object"
+    goal, mover = _target_goal(task), estimate.objects[grasp.subject]
+    for pose in move.poses:
+        assert is_free(planner, mover, pose)
+        assert pose[2, 3] > 0 and np.linalg.norm(pose[:2, 3] - goal.pose[:2, 3]) > 0.05
+
+
+def test_other_moves_are_tried_before_it_gives_up(stacked):
+    environment, perception, planner = stacked
+    estimate = perception.observe()
+    candidates = candidate_moves(environment.task.goals, estimate, planner)
+    first, second = next(candidates), next(candidates)
+    assert first.steps()[0].subject != second.steps()[0].subject
+    assert 0 < first.contact_allowance == second.contact_allowance
+    seen = []
+    with pytest.raises(InputError, match="none of .* can be moved"):
+        for move in candidates:
+            seen.append(move.contact_allowance)
+    assert seen == sorted(seen) and len(set(seen)) == 3 and len(seen) % 3 == 1
+
+
+def test_the_stack_supports_its_top_and_thin_air_does_not(stacked):
+    _, perception, planner = stacked
+    estimate = perception.observe()
+    assert all(is_supported(obj, estimate.scene) for obj in estimate.objects.values())
+    target = estimate.objects["object"]
+    raised = compose(np.eye(3), np.array([0.0, 0.0, 0.5])) @ target.pose
+    assert not is_supported(target, estimate.scene.with_body_at(target.body, raised))
+
+
+def test_nothing_is_left_to_do_once_the_target_is_there(stacked):
+    environment, perception, planner = stacked
+    task, goal = environment.task, _target_goal(environment.task)
+    obj = task.objects["object"]
+    before = obj.object_pose(environment.physics)
+    obj.place(environment.physics, goal.pose @ invert(obj.asset.label.pose))
+    moves = list(candidate_moves(task.goals, perception.observe(), planner))
+    assert [move.steps() for move in moves] == [()]
+    obj.place(environment.physics, before)
+    environment.physics.forward()
+
+
+def test_a_motion_that_does_not_touch_the_pile_ignores_its_own_contacts(stacked):
+    _, perception, planner = stacked
+    estimate = perception.observe()
+    assert estimate.scene.first_collision(estimate.joints) is None
+    touching = estimate.scene.touching(estimate.objects["object"].geoms, 0.002)
+    assert any(upwards > 0.3 for _, upwards in touching)
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize(("task", "seed"), [("pick", 2), ("multi", 3), ("stacked", 24)])
+def test_the_baseline_succeeds(task, seed):
+    result, _ = episode.run_episode(
+        EnvConfig(f"clutter/{task}", obs_mode="state"), EpisodeSpec(seed)
+    )
+    assert result.success_at_end, result.reason
+    assert result.max_penetration < 0.005

@@ -1,0 +1,116 @@
+"""Protocol v1 is what it was frozen as, and the tasks are still what it says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from manipose_mj import suite
+from manipose_mj.assets import catalogue
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.protocol import frozen
+from manipose_mj.evaluation.protocol.freeze import builtin_tasks, frozen_fields
+
+V1 = json.loads(frozen.protocol_path("v1").read_text(encoding="utf-8"))
+RULE = "a released protocol never changes: undo the change of the task, or add a version"
+TASK = "single_object/target_pose"
+
+
+def test_the_file_has_the_hash_it_states():
+    loaded = protocol.load("v1")
+    assert loaded.sha256 == frozen.digest(V1) == V1["sha256"]
+
+
+def test_an_edited_file_is_refused(tmp_path, monkeypatch):
+    document = json.loads(json.dumps(V1))
+    document["tasks"][TASK]["horizon"] += 1
+    (tmp_path / "v1.json").write_text(json.dumps(document), encoding="utf-8")
+    monkeypatch.setattr(frozen, "protocol_path", lambda version: tmp_path / "v1.json")
+    with pytest.raises(InputError, match="v1.json: its content does not have the sha256") as caught:
+        frozen.load.__wrapped__("v1")
+    assert "\n" not in str(caught.value)
+
+
+def test_it_has_every_task_of_this_package_and_no_other():
+    assert set(V1["tasks"]) == {spec.full_name for spec in builtin_tasks()}, RULE
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("spec", builtin_tasks(), ids=lambda spec: spec.full_name)
+def test_a_task_is_as_it_was_frozen(spec):
+    assert frozen_fields("v1", spec) == V1["tasks"].get(spec.full_name), RULE
+
+
+@pytest.mark.parametrize("name", V1["tasks"])
+def test_seeds_are_100_different_ones_with_names(name):
+    seeds = protocol.load("v1").task(name).seeds
+    assert len(seeds) == len(set(seeds.values())) == 100
+    assert list(seeds)[7] == f"v1/{name}/007"
+    assert seeds[f"v1/{name}/007"] == frozen.evaluation_seed("v1", name, 7)
+    assert all(0 <= seed < 2**32 for seed in seeds.values())
+
+
+def test_seeds_stay_what_they_are():
+    assert protocol.load("v1").seed(TASK, 0) == 1815592966
+    assert protocol.load("v1").seed(TASK, 99) == frozen.evaluation_seed("v1", TASK, 99)
+
+
+@pytest.mark.parametrize("name", V1["tasks"])
+def test_train_and_test_objects_have_nothing_in_common(name):
+    task = protocol.load("v1").task(name)
+    assert task.train_objects and task.test_objects
+    assert not set(task.train_objects) & set(task.test_objects)
+    for split, names in (("train", task.train_objects), ("test", task.test_objects)):
+        for each in names:
+            category, index = catalogue.find(each)
+            assert catalogue.CATALOGUE[category].split(index) == split, each
+
+
+def test_another_configuration_shows():
+    spec = next(s for s in builtin_tasks() if s.full_name == TASK)
+
+    def slower(options):
+        task = spec.factory(options)
+        object.__setattr__(task.config, "horizon", task.config.horizon + 1)
+        return task
+
+    changed = frozen_fields("v1", type(spec)(spec.domain, spec.name, slower, spec.tags, ""))
+    assert changed["horizon"] == V1["tasks"][TASK]["horizon"] + 1
+    assert changed["settings"] != V1["tasks"][TASK]["settings"]
+
+
+def test_unknown_names_are_one_line():
+    for wrong in (
+        lambda: protocol.load("v2"),
+        lambda: protocol.load("v1").task("single_object/target_pos"),
+        lambda: protocol.load("v1").seed(TASK, 100),
+    ):
+        with pytest.raises(InputError, match="v1") as caught:
+            wrong()
+        assert "\n" not in str(caught.value)
+
+
+def test_an_evaluation_takes_seeds_and_objects_from_it(tmp_path):
+    config = EvaluationConfig((TASK,), tmp_path, episodes=100, protocol="v1")
+    assert config.split == "test"
+    seeds = list(protocol.load("v1").task(TASK).seeds.values())
+    assert [config.episode_seed(TASK, i) for i in range(100)] == seeds
+    assert config.identity["protocol sha256"] == V1["sha256"]
+    assert "--protocol v1" in config.command and "--seed" not in config.command
+    plain = EvaluationConfig((TASK,), tmp_path)
+    assert plain.split == "train" and plain.identity["protocol"] is None
+
+
+def test_a_named_episode_uses_a_test_object():
+    environment = suite.load(*TASK.split("/"), split="test", obs_mode="state")
+    names = set()
+    for seed in list(protocol.load("v1").task(TASK).seeds.values())[:4]:
+        environment.random_state.seed(seed)
+        environment.reset()
+        names.add(environment.task.object_name)
+        assert np.isfinite(environment.physics.data.qpos).all()
+    assert names <= set(V1["tasks"][TASK]["test_objects"])

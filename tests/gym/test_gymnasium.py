@@ -1,0 +1,232 @@
+"""Gymnasium's own checker over every id; pickling, workers, failures, pictures, wrong input."""
+
+from __future__ import annotations
+
+import pickle
+import re
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+from manipose_mj import suite
+from manipose_mj.actions import CONTROL_MODES
+from manipose_mj.errors import InputError
+from manipose_mj.gym import ManiPoseEnv, env_id, register_envs
+from manipose_mj.tasks.goals import PoseGoal
+from manipose_mj.tasks.observations.sensors import MODES, SensorConfig
+from tests.conformance.own_tasks import FATAL_STEP, diverging, forget, registered
+
+ID = "manipose_mj/TargetPose-v0"
+# Joint torques and poses know no limits; targets of joints are radians, not shares of a range.
+SENSIBLE = (
+    "space minimum value is -infinity",
+    "space maximum value is infinity",
+    "we recommend using a symmetric and normalized space",
+)
+SENSORS = SensorConfig(cameras=("front",), height=24, width=32, cloud_size=256)
+
+
+@pytest.fixture(scope="module")
+def env() -> ManiPoseEnv:
+    return gymnasium.make(ID, reward_mode="dense").unwrapped
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
+def test_the_environment_checker_is_content(task):
+    _check(gymnasium.make(env_id(task[1])).unwrapped)
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
+def test_the_checker_is_content_with_control_modes(mode):
+    _check(gymnasium.make(ID, control_mode=mode, obs_mode="state").unwrapped)
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("mode", MODES)
+def test_the_checker_is_content_with_observation_modes(mode):
+    _check(gymnasium.make(ID, obs_mode=mode, sensors=SENSORS).unwrapped)
+
+
+def _check(checked: ManiPoseEnv) -> None:
+    assert isinstance(checked, ManiPoseEnv)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_env(checked, skip_render_check=True, skip_close_check=True)
+    strange = [str(w.message) for w in caught if not any(s in str(w.message) for s in SENSIBLE)]
+    assert not strange
+    checked.close()
+    checked.close()
+
+
+def test_the_checker_draws_and_closes_too():
+    made = gymnasium.make(ID, render_mode="rgb_array", height=24, width=32)
+    made.unwrapped.metadata = {
+        **ManiPoseEnv.metadata,
+        "render_modes": ["rgb_array"],
+    }  # no window here
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        check_env(made.unwrapped)
+    made.reset(seed=0)
+    picture = made.render()
+    assert picture.shape == (24, 32, 3) and picture.dtype == np.uint8 and picture.std() > 5
+    made.close()
+
+
+def test_ids_are_made_of_the_tasks_names():
+    assert env_id("articulated/store_chips_can_middle_drawer") == (
+        "manipose_mj/StoreChipsCanMiddleDrawer-v0"
+    )
+    register_envs()  # again
+    ids = {spec.id for spec in gymnasium.registry.values() if spec.namespace == "manipose_mj"}
+    assert {env_id(name) for _, name in suite.ALL_TASKS} <= ids
+
+
+def test_seeds_are_those_of_the_suite_and_replays_are_bit_identical(env):
+    theirs = suite.load("single_object", "target_pose", seed=17)
+    rng = np.random.default_rng(0)
+    actions = [env.action_space.low * 0.5 + 0.1 * rng.random(8) for _ in range(15)]
+    observations = [
+        [env.reset(seed=17)[0], *(env.step(a)[0] for a in actions), env.reset()[0]]
+        for _ in range(2)
+    ]
+    observations.append([theirs.reset().observation])
+    observations[-1] += [theirs.step(a).observation for a in actions] + [theirs.reset().observation]
+    for other in observations[1:]:
+        for one, two in zip(observations[0], other, strict=True):
+            assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
+def test_a_pickled_environment_goes_on_with_the_same_episodes(env):
+    env.reset(seed=3)
+    copy = pickle.loads(pickle.dumps(env))
+    assert copy.spec == env.spec
+    one, two = env.reset()[0], copy.reset()[0]
+    assert all(np.array_equal(one[name], two[name]) for name in one)
+    action = env.action_space.sample()
+    assert env.step(action)[1] == copy.step(action)[1] > 0  # the reward is dense in both
+    copy.close()
+
+
+def test_spawned_workers_run_a_task_of_another_package():
+    import tests.conformance.spawned_task  # noqa: F401  (registers it)
+
+    many = gymnasium.make_vec(env_id("spawned"), num_envs=2, obs_mode="state+pose")
+    try:
+        action = np.zeros((2, 8), np.float32)
+        first, _ = many.reset(seed=[1, 2])
+        assert first["pose/object"].shape == (2, 4, 4)
+        for _ in range(FATAL_STEP):
+            _, reward, terminated, _, info = many.step(action)
+        assert terminated.all() and not reward.any()
+        assert list(info["failure"]) == ["physics", "physics"] and not info["success"].any()
+        assert info["goal_error"].shape == (2, 2)
+        again, _ = many.reset(seed=[2, 1])
+        for name, value in first.items():
+            np.testing.assert_array_equal(value, again[name][::-1])
+    finally:
+        many.close()
+        forget("example", "spawned")
+        del sys.modules["tests.conformance.spawned_task"]
+
+
+def test_one_environment_needs_no_worker():
+    many = gymnasium.make_vec(ID, obs_mode="state")
+    assert many.num_envs == 1
+    many.reset(seed=0)
+    many.step(many.action_space.sample())
+    many.close()
+    with pytest.raises(InputError, match="num_envs is 0"):
+        gymnasium.make_vec(ID, num_envs=0)
+
+
+def test_a_divergence_terminates_with_its_failure_and_the_next_episode_is_clean():
+    with registered("diverge", diverging):
+        broken = gymnasium.make(env_id("diverge"))
+        space, action = broken.observation_space, np.zeros(8, np.float32)
+        broken.reset(seed=0)
+        for count in range(1, FATAL_STEP + 1):
+            observation, reward, terminated, truncated, info = broken.step(action)
+            assert terminated == (count == FATAL_STEP) and not truncated
+            assert info["failure"] == ("physics" if terminated else "")
+        assert reward == 0.0 and observation in space and not info["success"]
+        with pytest.raises(ResetNeeded):
+            broken.step(action)
+        _, info = broken.reset()
+        assert info["failure"] == ""
+        for count in range(1, 21):
+            observation, _, terminated, truncated, info = broken.step(action)
+            assert observation in space and not terminated and info["failure"] == ""
+            assert truncated == (count == 20)  # the task's horizon
+
+
+def test_success_and_reward_are_functions_of_a_state(env):
+    env.reset(seed=1)
+    state = env.scene_state()
+    assert not env.is_success(state)
+    assert 0 < env.reward_of(state) < 1
+    obj = state.objects["object"]
+    reached = (PoseGoal("object", obj.label_pose),)  # as in hindsight
+    assert env.is_success(state, reached) and env.reward_of(state, reached) == 1.0
+    _, reward, _, _, info = env.step(env.action_space.sample())
+    assert reward == env.reward_of(env.scene_state())
+    assert info["success"] == env.is_success(env.scene_state())
+    np.testing.assert_allclose(
+        info["goal_error"][0], env.environment.task.goal_error(env.environment.physics)[0]
+    )
+
+
+def test_spaces_follow_the_specifications():
+    seeing = gymnasium.make(ID, obs_mode="state+depth+segmentation+pointcloud", sensors=SENSORS)
+    observation, _ = seeing.reset(seed=0)
+    for name, spec in seeing.unwrapped.environment.observation_spec().items():
+        space = seeing.observation_space[name]
+        assert (space.shape, space.dtype) == (spec.shape, spec.dtype), name
+        assert observation[name] in space, name
+    limits = seeing.unwrapped.environment.action_spec()
+    low, high = (seeing.action_space.low.astype(float), seeing.action_space.high.astype(float))
+    assert (low >= limits.minimum).all() and (high <= limits.maximum).all()
+    np.testing.assert_allclose(low, limits.minimum, atol=1e-6)
+    seeing.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"obs_mode": "state+poses"}, "observation mode 'poses'; did you mean pose"),
+        ({"control_mode": "pd_joint_poss"}, "did you mean .*pd_joint_pos"),
+        ({"reward_mode": "shaped"}, "reward mode 'shaped'; did you mean sparse"),
+        ({"render_mode": "rgb"}, "render mode 'rgb'"),
+        ({"split": "validation"}, "split"),
+    ],
+)
+def test_unknown_modes_are_one_line_with_the_nearest_names(options, said):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Gymnasium's own on render modes
+        with pytest.raises(InputError, match=said) as caught:
+            gymnasium.make(ID, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_other_wrong_input_is_one_line(env, monkeypatch):
+    with pytest.raises(InputError, match="seed is -1"):
+        env.reset(seed=-1)
+    with pytest.raises(InputError, match="reset option 'goal'"):
+        env.reset(options={"goal": 1})
+    env.reset(seed=0)
+    for action in (np.zeros(7), np.full(8, np.nan)):
+        with pytest.raises(InputError, match="8 finite numbers"):
+            env.step(action)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    with pytest.raises(InputError, match="a window needs a display") as caught:
+        gymnasium.make(ID, render_mode="human")
+    assert re.fullmatch("[^\n]+", str(caught.value))

@@ -1,0 +1,212 @@
+"""Drawers and doors: which part a task is about, what fits behind it, and when each task is done."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dm_control import composer
+
+from asset_pipeline.build.articulated import build_articulated
+from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
+from manipose_mj import suite
+from manipose_mj.assets import catalogue
+from manipose_mj.errors import InputError
+from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+from manipose_mj.poses import compose, invert
+from manipose_mj.tasks.articulated.cavity_placement import resting, ways_to_lie
+from manipose_mj.tasks.articulated.part_choice import PartChoice, choose_part, kind_of
+from manipose_mj.tasks.articulated.registered import OPENABLES
+from manipose_mj.tasks.goals.conditions import inside_cavity
+from tests.places import REAL_DATA
+
+HOLD = np.append(HOME, MAX_OPENING)
+ARCHIVE = REAL_DATA / "partnet_mobility.tar.xz"
+needs_data = pytest.mark.skipif(
+    not ARCHIVE.is_file(),
+    reason=f"no {ARCHIVE}; set MANIPOSE_REAL_DATA to a folder with partnet_mobility.tar.xz",
+)
+
+
+def _load(task: str, **options) -> composer.Environment:
+    environment = suite.load("articulated", task, seed=0, obs_mode="state", **options)
+    environment.reset()
+    return environment
+
+
+def _reset(environment: composer.Environment, seed: int):
+    environment.random_state.seed(seed)
+    environment.reset()
+    return environment.task, environment.physics
+
+
+def _set(environment: composer.Environment, fraction: float) -> None:
+    task, physics = environment.task, environment.physics
+    low, high = task.part.joint.range
+    joint = physics.bind(task.furniture.joint(task.part.name))
+    joint.qpos, joint.qvel = low + fraction * (high - low), 0.0
+
+
+def test_every_verb_is_registered_for_every_part():
+    names = {name for domain, name in suite.ALL_TASKS if domain == "articulated"}
+    assert names == {"store_chips_can_middle_drawer"} | {
+        f"{verb}_{part}" for verb in ("open", "close", "store", "take_out") for part in OPENABLES
+    }
+
+
+@pytest.mark.parametrize(
+    ("level", "name"),
+    [("top", "top_drawer"), ("middle", "middle_drawer"), ("bottom", "bottom_drawer")],
+)
+def test_the_level_of_a_drawer_is_its_height(level, name):
+    asset = catalogue.load("cabinet", 0)
+    assert choose_part(asset, PartChoice(("drawer",), level), hollow=True).name == name
+
+
+def test_a_part_that_is_not_there_is_refused_with_those_that_are():
+    microwave = catalogue.load("microwave", 0)
+    with pytest.raises(InputError, match=r"no top drawer with a handle; its parts: door \(door\)"):
+        choose_part(microwave, PartChoice(("drawer",), "top"), hollow=False)
+    assert kind_of(catalogue.load("oven", 7).part("door")) == "flap"
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("part", OPENABLES)
+def test_open_is_met_from_nine_tenths_of_the_range_on(part):
+    environment = _load(f"open_{part}")
+    for seed in range(3):
+        task, _ = _reset(environment, seed)
+        assert environment.step(HOLD).reward == 0.0
+        _set(environment, 0.88)
+        assert environment.step(HOLD).reward == 0.0
+        _set(environment, 0.92)
+        assert environment.step(HOLD).reward == 1.0
+        assert task.part.name in [p.name for p in task.furniture.asset.parts]
+
+
+@pytest.mark.parametrize("part", ["top_drawer", "cabinet_door", "oven"])
+def test_close_starts_open_and_is_met_when_shut(part):
+    environment = _load(f"close_{part}")
+    low, high = OPENABLES[part].start_open
+    for seed in range(3):
+        task, physics = _reset(environment, seed)
+        fraction = float(task.scene_state(physics).parts[task.part.name].fraction)
+        assert low - 0.01 < fraction < high + 0.01  # it stays where it was put
+        assert environment.step(HOLD).reward == 0.0
+        _set(environment, 0.08)
+        assert environment.step(HOLD).reward == 1.0
+
+
+@pytest.mark.parametrize("part", ["middle_drawer", "microwave"])
+def test_what_is_inside_lies_inside_at_rest_and_apart(part):
+    environment = _load(f"store_{part}")
+    counts = []
+    for seed in range(8):
+        task, physics = _reset(environment, seed)
+        state = task.scene_state(physics)
+        others = [name for name in task.objects if name != "object"]
+        counts.append(len(others))
+        cavity = state.parts[task.part.name].cavity_pose
+        for name in others:
+            place = (invert(cavity) @ state.objects[name].label_pose)[:3, 3]
+            assert (np.abs(place) < task.part.cavity.extents / 2).all()
+            assert state.objects[name].linear_speed < 0.01
+        assert physics.data.contact.dist.min(initial=0.0) > -0.002
+        assert not task.success_now
+    assert set(counts) == {0, 1, 2}
+
+
+def test_fitting_is_by_stable_poses():
+    cavity = catalogue.load("microwave", 0).part("door").cavity
+    can = catalogue.load("chips_can", 0)
+    assert cavity is not None
+    ways = ways_to_lie(can, cavity)
+    assert ways
+    for stable, _ in ways:  # 25 cm tall: only lying
+        assert abs((can.stable_poses[stable].rotation @ can.label.rotation)[2, 0]) < 0.1
+
+
+def test_every_way_to_lie_in_a_cavity_counts_as_inside():
+    cavity = catalogue.load("microwave", 0).part("door").cavity
+    assert cavity is not None
+    for name in ("mug", "chips_can", "box"):
+        asset = catalogue.load(name, 0)
+        for stable, yaw in ways_to_lie(asset, cavity):
+            pose = resting(asset, stable, yaw).pose(cavity, np.zeros(2)) @ asset.label.pose
+            extents, axial = asset.label.extents, asset.label.symmetry.axial
+            assert inside_cavity(pose, extents, axial, cavity.extents, 0.002), (name, stable)
+            sunk = compose(np.eye(3), np.array([0.0, 0.0, -0.15])) @ pose
+            assert not inside_cavity(sunk, extents, axial, cavity.extents, 0.002)
+
+
+def test_taken_out_is_met_on_the_marked_area_with_the_drawer_shut():
+    environment = _load("take_out_top_drawer")
+    task, physics = _reset(environment, 1)
+    assert environment.step(HOLD).reward == 0.0
+    goal = task.goals[0]
+    rest = task.object.asset.stable_poses[0]
+    label = rest.rotation @ task.object.asset.label.origin
+    outside = np.array([*(goal.center - label[:2]), rest.height + 0.001])
+
+    def put(offset: float) -> float:
+        shift = np.array([0.0, offset, 0.0])
+        task.object.place(physics, compose(rest.rotation, outside + shift))
+        for _ in range(20):
+            step = environment.step(HOLD)
+        return step.reward
+
+    assert put(0.0) == 1.0
+    assert put(goal.half_sides[1] + 0.01) == 0.0
+    assert put(0.0) == 1.0
+    _set(environment, 0.5)
+    assert environment.step(HOLD).reward == 0.0
+
+
+def test_what_a_task_cannot_use_is_refused_in_one_line():
+    wide = catalogue.load("box", 0)
+    with pytest.raises(InputError, match="tasks that open take articulated ones") as caught:
+        _load("open_microwave", objects=[wide])
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="no bottom drawer"):
+        _load("store_bottom_drawer", objects=[catalogue.load("oven", 7)])
+    with pytest.raises(
+        InputError, match=r"chips_can_000 measures .* fits the cavity .* no stable pose"
+    ):
+        _load("store_cabinet_door", objects=[_shallow(), catalogue.load("chips_can", 0)])
+
+
+def _shallow():
+    """A cabinet behind whose door nothing fits."""
+    asset = catalogue.load("cabinet", 0)
+    parts = []
+    for part in asset.parts:
+        assert part.cavity is not None
+        small = replace(part.cavity, extents=part.cavity.extents * 0.1)
+        parts.append(replace(part, cavity=small))
+    return replace(asset, parts=tuple(parts))
+
+
+def test_a_part_without_a_cavity_is_refused_for_storing_but_can_be_opened():
+    asset = catalogue.load("cabinet", 0)
+    solid = replace(asset, parts=tuple(replace(p, cavity=None) for p in asset.parts))
+    with pytest.raises(InputError, match="'top_drawer' opens no cavity"):
+        _load("store_top_drawer", objects=[solid])
+    task, _ = _reset(_load("open_top_drawer", objects=[solid]), 0)
+    assert task.object_name == "cabinet_000"
+
+
+@pytest.mark.full
+@needs_data
+def test_furniture_of_partnet_mobility_serves(tmp_path):
+    item = next(i for i in partnet_mobility.items(ARCHIVE) if i.name == "46236")
+    with partnet_mobility.opened(item) as scan:
+        asset = build_articulated(scan, tmp_path / item.name)
+    # Of the built-in objects those that fit, or one's own.
+    assert len(_load("store_bottom_drawer", objects=[asset]).task.pool.entities) == 2
+    environment = _load("store_bottom_drawer", objects=[asset, catalogue.load("box", 1)])
+    task, _ = _reset(environment, 0)
+    assert task.furniture.asset.name == "46236" and task.object_name == "box_001"
+    environment.step(HOLD)
+    assert task.max_penetration < 0.005
+    assert not task.success_now

@@ -1,0 +1,115 @@
+"""Loading a task: its registration, its options, and what is refused."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from dm_control import suite as dm_suite
+
+import manipose_mj
+from manipose_mj import suite
+from manipose_mj.assets import catalogue
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.observations.sensors import SensorConfig
+from tests.tasks.episode_driver import HOLD
+
+TARGET_POSE = ("single_object", "target_pose")
+STORE = ("articulated", "store_chips_can_middle_drawer")
+
+
+def test_both_tasks_are_registered_and_described():
+    assert {TARGET_POSE, STORE} <= set(suite.ALL_TASKS)
+    assert all(len(suite.describe(*task)) > 20 for task in suite.ALL_TASKS)
+
+
+@pytest.mark.parametrize("observations", ["state+poses", "", "state+", "rgbd", "State"])
+def test_unknown_modes_are_refused_with_the_names_that_exist(observations):
+    with pytest.raises(InputError, match="observation mode.*(state|pose|depth|rgb)") as caught:
+        suite.load(*TARGET_POSE, obs_mode=observations)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("domain", "task", "near"),
+    [
+        ("single_object", "target_poses", "single_object/target_pose"),
+        ("articulate", "store_chips_can_midle_drawer", "store_chips_can_middle_drawer"),
+        ("", "zzz", "known: .*target_pose"),
+    ],
+)
+def test_unknown_tasks_are_refused_with_the_nearest_names(domain, task, near):
+    with pytest.raises(InputError, match=near):
+        suite.load(domain, task)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "near"),
+    [
+        ({"cameras": ("frnt",)}, "front"),
+        ({"cameras": ("wrist",)}, "panda/wrist"),
+        ({"height": 0}, "height"),
+        ({"width": -4}, "width"),
+        ({"cloud_size": 0}, "cloud_size"),
+    ],
+)
+def test_wrong_sensors_are_refused(sensors, near):
+    with pytest.raises(InputError, match=near):
+        suite.load(*STORE, sensors=SensorConfig(**sensors))
+
+
+def test_objects_of_the_wrong_kind_or_number_are_refused():
+    can, cabinet = catalogue.load("chips_can", 0), catalogue.load("cabinet", 0)
+    with pytest.raises(InputError, match="takes one object; got 2"):
+        suite.load(*STORE, objects=[can, can])
+    with pytest.raises(InputError, match="expected a rigid"):
+        suite.load(*STORE, objects=[cabinet])
+    with pytest.raises(InputError):
+        suite.load(*TARGET_POSE, objects=[cabinet])
+    with pytest.raises(InputError, match="at least one"):
+        suite.load(*TARGET_POSE, objects=[])
+
+
+def test_one_object_of_ones_own_is_the_one_in_play():
+    environment = suite.load(*TARGET_POSE, seed=0, objects=[catalogue.load("box", 1)])
+    environment.reset()
+    assert environment.task.object_name == "box_001"
+
+
+def test_the_time_limit_ends_the_episode():
+    environment = suite.load(*STORE, seed=0, environment_kwargs={"time_limit": 0.1})
+    environment.reset()
+    ended = [environment.step(HOLD).last() for _ in range(5)]
+    assert ended == [False] * 4 + [True]
+
+
+def test_dm_control_knows_the_tasks_once_registered(monkeypatch):
+    manipose_mj.register_suite()
+    manipose_mj.register_suite()
+    assert len(set(dm_suite.ALL_TASKS)) == len(dm_suite.ALL_TASKS)
+    asked, settings = [], {"random": 7, "time_limit": 5.0, "observations": "state"}
+
+    def load(domain, task, seed, **options):
+        asked.append((domain, task, seed, options))
+        return SimpleNamespace(task=SimpleNamespace())
+
+    monkeypatch.setattr(suite, "load", load)
+    for task in suite.ALL_TASKS:
+        assert task in dm_suite.ALL_TASKS
+        dm_suite.load(*task, task_kwargs=settings)
+    options = {"environment_kwargs": {"time_limit": 5.0}, "observations": "state"}
+    assert asked == [(*task, 7, options) for task in suite.ALL_TASKS]
+    assert dm_suite.load("cartpole", "balance").reset().first()
+
+
+@pytest.mark.parametrize("task", [TARGET_POSE, STORE], ids="/".join)
+def test_dm_control_loads_the_same_episodes(task):
+    manipose_mj.register_suite()
+    own = suite.load(*task, seed=7).reset()
+    for _ in range(2):
+        theirs = dm_suite.load(*task, task_kwargs={"random": 7, "time_limit": 5.0})
+        step = theirs.reset()
+        assert step.observation.keys() == own.observation.keys()
+        assert all(np.array_equal(step.observation[k], v) for k, v in own.observation.items())
+        assert theirs.step(HOLD).reward in (0.0, 1.0)
