@@ -11,10 +11,21 @@ from tests.array_checks import EVERY, FIRST_CALLS
 
 
 def test_a_wrong_shape_and_a_wrong_type_are_told():
-    with pytest.raises(TypeCheckError, match="pose"):
-        invert(np.eye(3))
-    with pytest.raises(TypeCheckError, match="pose"):
-        invert(np.eye(4, dtype=int))
+    assert "pose" in what_is_told(invert, np.eye(3))
+    assert "pose" in what_is_told(invert, np.eye(4, dtype=int))
+    assert what_is_told(invert, np.eye(4)) == ""
+
+
+def what_is_told(function, *arguments):
+    """What the check of one of the next calls says; the others answer what NumPy says of it."""
+    for _ in range(EVERY):
+        try:
+            function(*arguments)
+        except TypeCheckError as error:
+            return str(error)
+        except IndexError:
+            continue
+    return ""
 
 
 def test_what_was_called_often_is_checked_again_and_again():
