@@ -21,6 +21,7 @@ from manipose_mj.tasks.core.registry import (
     on_registration,
     task_spec,
 )
+from manipose_mj.tasks.core.scene_source import SceneSource
 
 ALL_TASKS: tuple[tuple[str, str], ...]  # always those of now: see __getattr__
 
@@ -78,16 +79,15 @@ def _made(
 
         moving = replace(config, control_mode="pd_joint_pos")
         return PrimitiveEnvironment(_made(spec, moving, seed, environment_kwargs))
-    task = spec.factory(config)
     arguments: dict[str, Any] = {
-        "time_limit": task.config.horizon,
         "random_state": seed,
         "strip_singleton_obs_buffer_dim": True,
         "recompile_mjcf_every_episode": False,
     }
     # The specification knows its module: a process that loads a pickled environment registers the task.
     again = partial(_made, spec, config, None, environment_kwargs)
-    return TaskEnvironment(task, rebuild=again, **{**arguments, **environment_kwargs})
+    scenes = SceneSource(spec, config)
+    return TaskEnvironment(scenes, rebuild=again, **{**arguments, **environment_kwargs})
 
 
 def describe(domain: str, task: str) -> str:

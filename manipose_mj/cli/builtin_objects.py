@@ -34,16 +34,16 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
     return [catalogue.load_by_name(name) for name in names]
 
 
-def names_in_tasks(tasks: Sequence[str], split: str = "train") -> list[str]:
-    """Of the built-in objects that tasks put into their scenes.
+def names_in_protocol(version: str, tasks: Sequence[str], episodes: int) -> list[str]:
+    """Of the built-in objects that the first episodes of a protocol use.
 
     Args:
-      tasks: `"domain/task"` names; those of other packages look after their objects themselves.
-      split: Which of the two sets of objects.
+      version: Of the protocol.
+      tasks: `"domain/task"` names.
+      episodes: Number per task.
     """
     from manipose_mj.evaluation import protocol
 
-    frozen = protocol.load(protocol.VERSIONS[-1]).tasks
-    fields = [frozen[task] for task in tasks if task in frozen]
-    names = (f.train_objects if split == "train" else f.test_objects for f in fields)
-    return sorted({name for each in names for name in each})
+    frozen = protocol.load(version)
+    used = (frozen.episode(task, i).objects for task in tasks for i in range(episodes))
+    return sorted({name for each in used for name in each})

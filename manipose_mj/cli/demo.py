@@ -27,19 +27,20 @@ def demo(
     out: Annotated[Path, arg(metavar="DIR")] = Path("demo_report"),
     jobs: int = CORES,
 ) -> int:
-    """Run a few episodes of tasks of every family and write a report with pictures.
+    """Run the protocol's first episodes of tasks of every family and write a report with pictures.
 
     Args:
       out: Folder for the report; an earlier demo in it is replaced.
       jobs: Episodes at the same time, one core each.
     """
     one_thread_per_process()
-    from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
+    from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.evaluation.config import EvaluationConfig
+    from manipose_mj.evaluation.protocol import VERSIONS
 
-    config = EvaluationConfig(TASKS, out, episodes=EPISODES, jobs=jobs)
+    config = EvaluationConfig(TASKS, out, episodes=EPISODES, jobs=jobs, protocol=VERSIONS[-1])
     _claim(out)
-    load_objects(names_in_tasks(TASKS), jobs)
+    load_objects(names_in_protocol(VERSIONS[-1], TASKS, EPISODES), jobs)
     return run_and_report(config, resume=False)
 
 

@@ -35,12 +35,12 @@ def evaluate(
       jobs: Episodes at the same time, one core each; results do not depend on it.
       out: Folder for the results; by default a new one under manipose_results.
       resume: Go on with the results in --out after an interruption.
-      objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
-        folders of asset folders.
+      objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
+        folders, or folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
     """
     one_thread_per_process()
-    from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
+    from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.protocol.frozen import EPISODES
 
@@ -54,8 +54,10 @@ def evaluate(
         tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol
     )
     named = check_names(tasks, objects)
-    # Once and here: workers would each build the same.
-    load_objects(named if objects else names_in_tasks(tasks, config.split), jobs)
+    if protocol is not None:
+        named = names_in_protocol(protocol, tasks, episodes)
+    # Once and here: workers would each build the same. What seeds draw is built when it is drawn.
+    load_objects(named, jobs)
     return run_and_report(config, resume=resume)
 
 

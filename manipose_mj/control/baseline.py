@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import islice
 
+import mujoco
 import numpy as np
 from dm_control import composer
 
@@ -48,11 +50,20 @@ class _Progress:
         return same
 
 
+@dataclass(frozen=True)
+class _Scene:
+    """What the baseline compiles for one scene, whose model is `model`."""
+
+    model: mujoco.MjModel
+    arm: ArmModel
+    perception: Perception
+
+
 class Baseline:
     """Plans and acts in one environment; build it once, run it for many episodes."""
 
     def __init__(self, environment: composer.Environment, pose: str = "oracle") -> None:
-        """Compiles the planner's models.
+        """Compiles the planner's models; those of another scene when an episode has one.
 
         Args:
           environment: Of one of this package's tasks, after its first reset.
@@ -61,18 +72,27 @@ class Baseline:
         Raises:
           InputError: There is no such source.
         """
-        task = environment.task
-        assert isinstance(task, ManipulationTask)
-        self._task = task
-        self._physics = environment.physics
-        self._arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        self._perception = make_perception(pose, task, self._physics)
+        self._environment, self._pose = environment, pose
+        self._compiled = self._compile()
         self.status = ""
 
     @property
     def perception(self) -> Perception:
-        """Where the baseline's knowledge comes from."""
-        return self._perception
+        """Where the baseline's knowledge of the present scene comes from."""
+        return self._scene().perception
+
+    def _scene(self) -> _Scene:
+        """What is compiled for the environment's present scene."""
+        if self._compiled.model is not self._environment.physics.model.ptr:
+            self._compiled = self._compile()
+        return self._compiled
+
+    def _compile(self) -> _Scene:
+        task, physics = self._environment.task, self._environment.physics
+        assert isinstance(task, ManipulationTask)
+        arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
+        perception = make_perception(self._pose, task, physics)
+        return _Scene(physics.model.ptr, arm, perception)
 
     def actions(self, seed: int) -> Iterator[Action]:
         """The actions of one episode, from the start state to the goal.
@@ -84,18 +104,19 @@ class Baseline:
           StageFailure: The baseline gives up; the stage says where.
         """
         self.status = ""
-        self._perception.reset(seed)
-        timestep = self._task.control_timestep
-        executor = Executor(self._perception, timestep)
+        scene, task = self._scene(), self._environment.task
+        scene.perception.reset(seed)
+        timestep = task.control_timestep
+        executor = Executor(scene.perception, timestep)
         primitives = Primitives(executor)
         rng = np.random.default_rng(seed)
         progress, failures, allowance = _Progress(), 0, 0.0
         while True:
             estimate = executor.observe()
-            planner = MotionPlanner(estimate.scene, self._arm, timestep, rng, allowance)
-            step_by_step = in_clutter(self._task.goals, estimate)
+            planner = MotionPlanner(estimate.scene, scene.arm, timestep, rng, allowance)
+            step_by_step = in_clutter(task.goals, estimate)
             try:
-                candidates = candidate_plans(self._task.goals, estimate, planner)
+                candidates = candidate_plans(task.goals, estimate, planner)
                 candidate = _after(candidates, progress.failures_here)
                 plan = candidate.steps()
             except InputError as error:

@@ -15,7 +15,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 
 if TYPE_CHECKING:
-    from manipose_mj.tasks.core.config import EnvConfig
+    from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class EvaluationConfig:
                 f"protocol {self.protocol} fixes seeds and objects; leave out seed and objects"
             )
         for task in self.tasks:
-            frozen.seed(task, self.episodes - 1)
+            frozen.episode(task, self.episodes - 1)
 
     @property
     def poses(self) -> dict[str, str]:
@@ -91,8 +91,17 @@ class EvaluationConfig:
     def episode_seed(self, task: str, episode: int) -> int:
         """The seed of one episode."""
         if self.protocol is not None:
-            return protocol.load(self.protocol).seed(task, episode)
+            return protocol.load(self.protocol).episode(task, episode).seed
         return episode_seed(self.seed, task, episode)
+
+    def episode_spec(self, task: str, episode: int) -> EpisodeSpec:
+        """What one episode is."""
+        # Loads the simulator: workers only.
+        from manipose_mj.tasks.core.config import EpisodeSpec
+
+        if self.protocol is not None:
+            return EpisodeSpec(**protocol.load(self.protocol).episode(task, episode).asked)
+        return EpisodeSpec(self.episode_seed(task, episode))
 
     @property
     def identity(self) -> dict[str, Any]:

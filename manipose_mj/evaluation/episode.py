@@ -128,7 +128,7 @@ class _Recorder:
 
 @lru_cache(maxsize=4)
 def _environment(config: EnvConfig, pose: str) -> tuple[TaskEnvironment, Baseline]:
-    """Compiled once per process and scene."""
+    """Made once per process and configuration."""
     environment = suite.make(config, 0)
     environment.reset()
     return environment, Baseline(environment, pose)

@@ -221,10 +221,9 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     path = trajectory_path(config.out, task, episode)
     start = time.perf_counter()
     try:
-        from manipose_mj.tasks.core.config import EpisodeSpec  # loads the simulator: workers only
-
+        spec = config.episode_spec(task, episode)
         result, trajectory = runner(
-            config.env_config(task), EpisodeSpec(seed), episode=episode, pose=config.pose
+            config.env_config(task), spec, episode=episode, pose=config.pose
         )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
     except (InputError, OSError, MemoryError):

@@ -16,6 +16,7 @@ from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.observations.sensors import MODES, SensorConfig
 from tests.conformance.own_tasks import FATAL_STEP, diverging, registered
+from tests.few_objects import load
 
 TASK = ("single_object", "target_pose")
 SENSORS = SensorConfig(cameras=("front",), height=24, width=32, cloud_size=256)
@@ -52,15 +53,13 @@ class Conformance(EnvironmentTestMixin, absltest.TestCase):
 @pytest.mark.sample(6)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_tasks_conform(task):
-    Conformance(suite.load(*task, seed=0, environment_kwargs=SHORT)).check()
+    Conformance(load(*task, seed=0, environment_kwargs=SHORT)).check()
 
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
 def test_control_modes_conform(mode):
-    environment = suite.load(
-        *TASK, seed=0, obs_mode="state", control_mode=mode, environment_kwargs=SHORT
-    )
+    environment = load(*TASK, seed=0, obs_mode="state", control_mode=mode, environment_kwargs=SHORT)
     assert environment.action_spec().name == mode
     Conformance(environment).check()
 
@@ -68,14 +67,12 @@ def test_control_modes_conform(mode):
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", MODES)
 def test_observation_modes_conform(mode):
-    environment = suite.load(
-        *TASK, seed=0, obs_mode=mode, sensors=SENSORS, environment_kwargs=SHORT
-    )
+    environment = load(*TASK, seed=0, obs_mode=mode, sensors=SENSORS, environment_kwargs=SHORT)
     Conformance(environment).check()
 
 
 def test_a_pickled_environment_goes_on_with_the_same_episodes():
-    first = suite.load(*TASK, seed=5, control_mode="pd_ee_delta_pose", obs_mode="state+pose")
+    first = load(*TASK, seed=5, control_mode="pd_ee_delta_pose", obs_mode="state+pose")
     first.reset()
     second = pickle.loads(pickle.dumps(first))
     spec = first.action_spec()
@@ -111,7 +108,7 @@ def test_unknown_modes_are_one_line_with_the_nearest_names(options, said):
 
 def test_a_diverging_simulation_ends_its_episode_and_leaves_nothing_to_the_next():
     with registered("diverge", diverging) as task:
-        broken, sound = (suite.load(*task, seed=seed) for seed in (3, 4))
+        broken, sound = (load(*task, seed=seed) for seed in (3, 4))
         specs = broken.observation_spec()
         action = sound.action_spec().generate_value()
         sound.reset()  # its episode that would have diverged
@@ -136,7 +133,7 @@ def test_a_diverging_simulation_ends_its_episode_and_leaves_nothing_to_the_next(
 
 
 def test_a_start_that_diverges_is_followed_by_another(monkeypatch, caplog):
-    environment, sound = (suite.load(*TASK, seed=3) for _ in range(2))
+    environment, sound = (load(*TASK, seed=3) for _ in range(2))
     task, fatal, states = environment.task, [True, True, False], []
     draw, write = task.draw, task.scene.write
 

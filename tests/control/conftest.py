@@ -7,22 +7,20 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.control.grasping.candidates import reachable
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.scene.collision_model import CollisionModel
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.mjcf.panda.kinematics import HOME
 from manipose_mj.poses import compose
+from tests.few_objects import load
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 @pytest.fixture(scope="module")
 def environment():
-    environment = suite.load(
-        "articulated", "store_chips_can_middle_drawer", seed=1, obs_mode="state"
-    )
+    environment = load("articulated", "store_chips_can_middle_drawer", seed=1, obs_mode="state")
     environment.reset()
     return environment
 

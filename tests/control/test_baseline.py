@@ -7,7 +7,6 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution.executor import Executor
@@ -22,6 +21,7 @@ from manipose_mj.poses import compose, invert, rotation_angle
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.goals import PoseGoal
 from manipose_mj.tasks.single_object.target_pose import TargetPose
+from tests.few_objects import config, load
 from tests.tasks.contact import touches_robot
 
 TARGET_POSE = "single_object/target_pose"
@@ -31,7 +31,7 @@ HOLD = np.append(HOME, MAX_OPENING)
 
 
 def _run(task: str, seed: int) -> tuple[EpisodeResult, Trajectory]:
-    return episode.run_episode(EnvConfig(task, obs_mode="state"), EpisodeSpec(seed))
+    return episode.run_episode(config(task, obs_mode="state"), EpisodeSpec(seed))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_the_record_follows_the_episode(episodes):
     assert result.sim_time == pytest.approx(result.steps * 0.02)
     assert times[0] == 0 and times[-1] == pytest.approx(result.sim_time, abs=1e-6)
     assert (np.diff(times) >= 0).all() and len(positions) == len(times)
-    start = EnvConfig(TARGET_POSE, obs_mode="state"), EpisodeSpec(0)
+    start = config(TARGET_POSE, obs_mode="state"), EpisodeSpec(0)
     model = episode.scene_model(*start)
     assert positions.shape[1] == model.nq
     _, data = episode.start_state(*start)
@@ -87,7 +87,7 @@ def test_the_record_follows_the_episode(episodes):
 
 @pytest.mark.parametrize("name", ["chips_can_000", "box_000"])
 def test_a_held_object_does_not_slip(name):
-    environment = suite.load(
+    environment = load(
         "single_object",
         "target_pose",
         seed=0,
@@ -100,7 +100,7 @@ def test_a_held_object_does_not_slip(name):
     executor = Executor(baseline.perception, task.control_timestep)
     rng = np.random.default_rng(0)
     scene = executor.observe().scene
-    planner = MotionPlanner(scene, baseline._arm, task.control_timestep, rng)
+    planner = MotionPlanner(scene, baseline._scene().arm, task.control_timestep, rng)
     primitives = Primitives(executor)
 
     def play(actions) -> None:
@@ -160,7 +160,7 @@ def test_stopping_short_of_the_goal_is_a_failure(monkeypatch):
 
 
 def test_running_out_of_time_is_recorded(monkeypatch):
-    environment, _ = episode._environment(EnvConfig(TARGET_POSE, obs_mode="state"), "oracle")
+    environment, _ = episode._environment(config(TARGET_POSE, obs_mode="state"), "oracle")
     monkeypatch.setattr(environment, "_time_limit", 0.1)
     result = _fail(monkeypatch, lambda self, seed: iter([HOLD] * 100))
     assert (result.failure, result.steps) == ("timeout", 5)

@@ -6,12 +6,13 @@ import pytest
 from dm_control import composer
 
 from manipose_mj import suite
+from tests.few_objects import load
 
 
 @pytest.fixture(scope="module", params=suite.ALL_TASKS, ids="/".join)
 def blind(request) -> composer.Environment:
     """One environment a task, without sensors, for long runs."""
-    return suite.load(*request.param, seed=0, obs_mode="state")
+    return load(*request.param, seed=0, obs_mode="state")
 
 
 @pytest.fixture(

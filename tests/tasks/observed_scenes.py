@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from dm_control import composer
 
-from manipose_mj import suite
 from manipose_mj.tasks.observations.sensors import MODES, CameraView, PoseNoise, SensorConfig
+from tests import few_objects
 
 TARGET_POSE = ("single_object", "target_pose")
 STORE = ("articulated", "store_chips_can_middle_drawer")
@@ -36,7 +36,7 @@ def load(
     task: tuple[str, str], observations: str, sensors: SensorConfig = SMALL, seed: int = 0
 ) -> composer.Environment:
     """The environment of a task, by domain and name."""
-    return suite.load(*task, seed=seed, obs_mode=observations, sensors=sensors)
+    return few_objects.load(*task, seed=seed, obs_mode=observations, sensors=sensors)
 
 
 def hold(environment: composer.Environment) -> np.ndarray:

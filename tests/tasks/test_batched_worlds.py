@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from manipose_mj import suite
 from manipose_mj.poses import SymmetryGroup, compose
 from manipose_mj.tasks.goals import (
     InsideGoal,
@@ -31,6 +30,7 @@ from manipose_mj.tasks.scene.indices import find_indices, shapes_of
 from manipose_mj.tasks.scene.read import PhysicsArrays, read
 from manipose_mj.tasks.scene.reader import arrays
 from manipose_mj.tasks.scene.state import ObjectState, PartState, SceneState
+from tests.few_objects import load
 
 TOLERANCE = Tolerance()
 MEMBERS = 8
@@ -195,7 +195,7 @@ def test_own_goals_are_registered_by_their_annotations():
 @pytest.fixture(scope="module")
 def scenes():
     """Two environments with other objects, at the start of an episode."""
-    environments = [suite.load("articulated", "store_middle_drawer", seed) for seed in (0, 1)]
+    environments = [load("articulated", "store_middle_drawer", seed) for seed in (0, 1)]
     for environment in environments:
         environment.reset()
     return environments

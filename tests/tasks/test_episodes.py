@@ -10,6 +10,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.model import SERVO_LAG
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING, VELOCITY_LIMITS
 from manipose_mj.tasks.observations.sensors import SensorConfig
+from tests.few_objects import load
 from tests.tasks.contact import touches_robot
 from tests.tasks.episode_driver import HOLD, reset, wander
 
@@ -20,8 +21,7 @@ SENSORS = SensorConfig(height=60, width=80, cloud_size=4096)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_the_same_seed_and_actions_give_the_same_bits(task):
     first, second = (
-        suite.load(*task, seed=11, obs_mode="state+pose+segmentation", sensors=SENSORS)
-        for _ in range(2)
+        load(*task, seed=11, obs_mode="state+pose+segmentation", sensors=SENSORS) for _ in range(2)
     )
     pairs = [(first.reset(), second.reset())]
     pairs += [(first.step(a), second.step(a)) for a in wander(first, 30, 1)]

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from dm_control import composer
 
-from manipose_mj import suite
 from manipose_mj.poses import compose, invert, rotation_about, transform
 from manipose_mj.tasks.core.task import ManipulationTask
+from tests.few_objects import load
 from tests.tasks.episode_driver import HOLD, hold, reset
 
 
 @pytest.fixture(scope="module")
 def target_pose() -> composer.Environment:
-    return suite.load("single_object", "target_pose", seed=0, obs_mode="state")
+    return load("single_object", "target_pose", seed=0, obs_mode="state")
 
 
 @pytest.fixture(scope="module")
 def store() -> composer.Environment:
-    return suite.load("articulated", "store_chips_can_middle_drawer", seed=0, obs_mode="pose")
+    return load("articulated", "store_chips_can_middle_drawer", seed=0, obs_mode="pose")
 
 
 def test_every_built_in_object_stays_where_it_is_put(target_pose):

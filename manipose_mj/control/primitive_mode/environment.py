@@ -65,7 +65,7 @@ class PrimitiveEnvironment(dm_env.Environment):
         mode = task.control_mode.name
         if mode != "pd_joint_pos":
             raise InputError(f"primitive acts through pd_joint_pos; the environment is in {mode}")
-        self._environment, self._task = environment, task
+        self._environment = environment
         self._config = config or PrimitiveConfig()
         self._controller: _Controller | None = None
         self._last: dm_env.TimeStep | None = None
@@ -93,8 +93,8 @@ class PrimitiveEnvironment(dm_env.Environment):
 
     @property
     def task(self) -> ManipulationTask:
-        """The task."""
-        return self._task
+        """The task, with the scene of the present episode."""
+        return self._environment.task
 
     def action_spec(self) -> specs.BoundedArray:
         """Which primitive, position, quaternion."""
@@ -120,7 +120,7 @@ class PrimitiveEnvironment(dm_env.Environment):
         """Start an episode; arguments as for `TaskEnvironment`."""
         first = self._environment.reset(spec)
         if self._controller is None or not self._controller.fits(self.physics):
-            self._controller = _Controller(self._task, self.physics)
+            self._controller = _Controller(self.task, self.physics)
         self._count = 0
         return self._told(first, Status.DONE)
 
@@ -145,7 +145,7 @@ class PrimitiveEnvironment(dm_env.Environment):
                 if timestep.last():
                     status = Status.STOPPED
         if timestep.reward is None:  # nothing has moved yet
-            timestep = timestep._replace(reward=self._task.get_reward(self.physics), discount=1.0)
+            timestep = timestep._replace(reward=self.task.get_reward(self.physics), discount=1.0)
         if not timestep.last():
             over = self._count >= self._config.max_primitives
             timestep = timestep._replace(

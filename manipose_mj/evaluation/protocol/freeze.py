@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
-from manipose_mj.assets.categories import Split
+import numpy as np
+
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.protocol.frozen import (
     EPISODES,
@@ -20,11 +22,10 @@ from manipose_mj.evaluation.protocol.frozen import (
     evaluation_seed,
     protocol_path,
 )
-from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
-from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import TaskSpec, all_tasks, task_spec
-from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.core.scene_source import SceneSource
 
 
 def builtin_tasks() -> list[TaskSpec]:
@@ -33,29 +34,49 @@ def builtin_tasks() -> list[TaskSpec]:
     return [spec for spec in specs if spec.factory.__module__.startswith("manipose_mj.tasks.")]
 
 
-def frozen_fields(version: str, spec: TaskSpec) -> dict[str, Any]:
-    """What the version's file says of a task, from the task itself."""
-    train, test = _built(spec, "train"), _built(spec, "test")
+def frozen_settings(spec: TaskSpec) -> dict[str, Any]:
+    """What the protocol's file says of a task's configuration, from the task itself."""
+    scenes = SceneSource(spec, evaluation_config(spec))
+    task = scenes.build(scenes.draw(np.random.RandomState(0), EpisodeSpec()))
     return {
-        "horizon": test.config.horizon,
-        "tolerance": asdict(test.config.tolerance),
-        "settings": hashlib.sha256(repr(test.config).encode("utf-8")).hexdigest()[:16],
-        "train_objects": object_names(train),
-        "test_objects": object_names(test),
-        "seeds": [evaluation_seed(version, spec.full_name, i) for i in range(EPISODES)],
+        "horizon": task.config.horizon,
+        "tolerance": asdict(task.config.tolerance),
+        "settings": hashlib.sha256(repr(task.config).encode("utf-8")).hexdigest()[:16],
     }
 
 
-def object_names(task: ManipulationTask) -> list[str]:
-    """The assets of a task's scene, used by an episode or waiting, sorted."""
-    kinds = (RigidObject, ArticulatedObject)
-    entities = task.root_entity.iter_entities()
-    return sorted({entity.asset.name for entity in entities if isinstance(entity, kinds)})
+def frozen_episodes(version: str, spec: TaskSpec) -> list[dict[str, Any]]:
+    """The entries of a task's episodes: every group of its objects comes equally often."""
+    scenes = SceneSource(spec, evaluation_config(spec))
+    groups = scenes.strata()
+    entries = []
+    for i in range(EPISODES):
+        group = groups[i % len(groups)]
+        asked = group[i // len(groups) % len(group)]
+        seed = evaluation_seed(version, spec.full_name, i)
+        entries.append(frozen_entry(scenes, replace(asked, seed=seed)))
+    return entries
+
+
+def frozen_entry(scenes: SceneSource, asked: EpisodeSpec) -> dict[str, Any]:
+    """The file's entry of an episode: what is asked of it, and the objects that its seed draws."""
+    drawn = scenes.draw(np.random.RandomState(asked.seed), asked)
+    names = () if drawn is None else tuple(asset.name for asset in drawn.assets)
+    entry = {name: value for name, value in asdict(asked).items() if value is not None}
+    return {**entry, "objects": list(dict.fromkeys(names))}
+
+
+def evaluation_config(spec: TaskSpec) -> EnvConfig:
+    """The environment that evaluations take place in."""
+    return EnvConfig(spec.full_name, obs_mode="state", split="test")
 
 
 def document(version: str) -> dict[str, Any]:
     """The content of the version's file, from the tasks."""
-    tasks = {spec.full_name: frozen_fields(version, spec) for spec in builtin_tasks()}
+    tasks = {
+        spec.full_name: {**frozen_settings(spec), "episodes": frozen_episodes(version, spec)}
+        for spec in builtin_tasks()
+    }
     content: dict[str, Any] = {"version": version, "tasks": dict(sorted(tasks.items()))}
     return {"version": version, "sha256": digest(content), "tasks": content["tasks"]}
 
@@ -66,7 +87,9 @@ def main(arguments: list[str]) -> int:
     if version not in VERSIONS:
         raise unknown_name("protocol", version, VERSIONS)
     content = document(version)
-    lines = json.dumps(content, indent=1).replace("\n    ", " ").replace("\n   ]", " ]")
+    lines = json.dumps(content, indent=1)
+    # An episode a line.
+    lines = re.sub(r"\n {5,}", " ", lines).replace("\n    }", " }")
     path = protocol_path(version)
     try:
         path.write_text(lines + "\n", encoding="utf-8")
@@ -74,10 +97,6 @@ def main(arguments: list[str]) -> int:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
     sys.stdout.write(f"{path}: {len(content['tasks'])} tasks, sha256 {content['sha256']}\n")
     return 0
-
-
-def _built(spec: TaskSpec, split: Split) -> ManipulationTask:
-    return spec.factory(EnvConfig(spec.full_name, obs_mode="state", split=split))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,30 @@ EPISODES = 100
 
 
 @dataclass(frozen=True)
+class FrozenEpisode:
+    """One evaluation episode.
+
+    Attributes:
+      seed: From which all that is random about it follows.
+      object: Name of the rigid object that it shall be about; None leaves it to the seed.
+      furniture: Name of the piece of furniture, likewise.
+      part: Name of its drawer or door, likewise.
+      objects: What the seed then draws: all objects of the scene, by name.
+    """
+
+    seed: int
+    object: str | None
+    furniture: str | None
+    part: str | None
+    objects: tuple[str, ...]
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The fields of its `EpisodeSpec`."""
+        return {name: getattr(self, name) for name in ("seed", "object", "furniture", "part")}
+
+
+@dataclass(frozen=True)
 class FrozenTask:
     """What a protocol fixes about one task.
 
@@ -24,17 +48,23 @@ class FrozenTask:
       horizon: Time limit [s].
       tolerance: The fields of `Tolerance`, SI units and radians.
       settings: Digest of the whole configuration, ranges of places and the like.
-      train_objects: Names of the built-in assets for training.
-      test_objects: Those for evaluation; the two have nothing in common.
-      seeds: 100 evaluation episodes, by name: `"v1/single_object/target_pose/000"`.
+      episodes: 100 evaluation episodes, by name: `"v1/single_object/target_pose/000"`.
     """
 
     horizon: float
     tolerance: Mapping[str, float]
     settings: str
-    train_objects: tuple[str, ...]
-    test_objects: tuple[str, ...]
-    seeds: Mapping[str, int]
+    episodes: Mapping[str, FrozenEpisode]
+
+    @property
+    def seeds(self) -> dict[str, int]:
+        """The seeds of the episodes, by name."""
+        return {name: episode.seed for name, episode in self.episodes.items()}
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """The names of all built-in objects that the episodes use, sorted."""
+        return tuple(sorted({name for each in self.episodes.values() for name in each.objects}))
 
 
 @dataclass(frozen=True)
@@ -55,18 +85,18 @@ class Protocol:
             raise unknown_name(f"task of protocol {self.version}", name, self.tasks)
         return self.tasks[name]
 
-    def seed(self, task: str, episode: int) -> int:
-        """The seed of one evaluation episode.
+    def episode(self, task: str, number: int) -> FrozenEpisode:
+        """One evaluation episode.
 
         Raises:
           InputError: This version does not have the task, or has fewer episodes.
         """
-        seeds = list(self.task(task).seeds.values())
-        if not 0 <= episode < len(seeds):
+        episodes = list(self.task(task).episodes.values())
+        if not 0 <= number < len(episodes):
             raise InputError(
-                f"protocol {self.version} has {len(seeds)} episodes of {task}; there is no {episode}"
+                f"protocol {self.version} has {len(episodes)} episodes of {task}; there is no {number}"
             )
-        return seeds[episode]
+        return episodes[number]
 
 
 @cache
@@ -90,13 +120,20 @@ def load(version: str) -> Protocol:
             horizon=fields["horizon"],
             tolerance=fields["tolerance"],
             settings=fields["settings"],
-            train_objects=tuple(fields["train_objects"]),
-            test_objects=tuple(fields["test_objects"]),
-            seeds={f"{version}/{name}/{i:03d}": seed for i, seed in enumerate(fields["seeds"])},
+            episodes={
+                f"{version}/{name}/{i:03d}": read_episode(entry)
+                for i, entry in enumerate(fields["episodes"])
+            },
         )
         for name, fields in document["tasks"].items()
     }
     return Protocol(version, document["sha256"], tasks)
+
+
+def read_episode(entry: Mapping[str, Any]) -> FrozenEpisode:
+    """An episode from its entry in the file, where what is left to the seed is left out."""
+    asked = {name: entry.get(name) for name in ("object", "furniture", "part")}
+    return FrozenEpisode(seed=entry["seed"], **asked, objects=tuple(entry["objects"]))
 
 
 def protocol_path(version: str) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,83 +161,70 @@ def _apart(place: Float[np.ndarray, "2"], reach: Float[np.ndarray, "3"], other: 
     return bool((np.abs(place - other.place) >= reach[:2] + other.reach[:2] + GAP).any())
 
 
-class CavityPlacement:
-    """Which objects of a pool go behind which parts of furniture, and where they lie there."""
+def ways_into(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
+    """`ways_to_lie` in the cavity of a part.
 
-    def __init__(self, pool: ObjectPool, parts: Sequence[MovingPart], *, taken: bool) -> None:
+    Raises:
+      InputError: There is none.
+    """
+    ways = ways_to_lie(asset, _cavity(part))
+    if not ways:
+        lengths = " x ".join(f"{1000 * v:.0f}" for v in asset.label.extents)
+        room = " x ".join(f"{1000 * v:.0f}" for v in _cavity(part).extents)
+        raise InputError(
+            f"{asset.folder}: {asset.name} measures {lengths} mm and fits the cavity of "
+            f"{part.name!r} ({room} mm) in no stable pose"
+        )
+    return ways
+
+
+def ways_out(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
+    """Those of `ways_into` out of which a hand can take the asset.
+
+    Raises:
+      InputError: There is none.
+    """
+    ways = tuple(way for way in ways_into(asset, part) if hand_room(asset, part, *way))
+    if not ways:
+        raise InputError(
+            f"part {part.name!r}: a gripper that opens 80 mm can take none of {asset.name} out of it; "
+            "choose narrower objects"
+        )
+    return ways
+
+
+class CavityPlacement:
+    """Where the objects of a pool lie in the cavity behind a part; the first is what the episode is about."""
+
+    def __init__(self, pool: ObjectPool, part: MovingPart, *, taken: bool) -> None:
         """Looks up every way to lie.
 
         Args:
           pool: Of objects.
-          parts: The part in question of each piece of furniture.
-          taken: Whether objects are to be taken out: they lie so that a hand can.
+          part: In question.
+          taken: Whether the first object is to be taken out: it lies so that a hand can.
 
         Raises:
-          InputError: An object fits no cavity, or cannot be taken out of any.
+          InputError: An object does not fit the cavity, or the first cannot be taken out of it.
         """
-        self._pool = pool
         self._assets = tuple(entity.asset for entity in pool.entities)
-        self._parts = tuple(parts)
-        self._ways = [
-            [ways_to_lie(asset, _cavity(part)) for asset in self._assets] for part in self._parts
-        ]
-        # Those of the object that an episode is about.
-        self._own = self._ways
-        if taken:
-            self._own = [
-                [
-                    tuple(way for way in ways if hand_room(asset, part, *way))
-                    for asset, ways in zip(self._assets, of_part, strict=True)
-                ]
-                for part, of_part in zip(self._parts, self._ways, strict=True)
-            ]
-        for index, asset in enumerate(self._assets):
-            if not any(ways[index] for ways in self._ways):
-                lengths = " x ".join(f"{1000 * v:.0f}" for v in asset.label.extents)
-                room = " x ".join(f"{1000 * v:.0f}" for v in _cavity(self._parts[0]).extents)
-                raise InputError(
-                    f"{asset.folder}: {asset.name} measures {lengths} mm and fits the cavity of "
-                    f"{self._parts[0].name!r} ({room} mm) in no stable pose"
-                )
-        for part, own in zip(self._parts, self._own, strict=True):
-            if not any(own):
-                names = ", ".join(asset.name for asset in self._assets)
-                raise InputError(
-                    f"part {part.name!r}: a gripper that opens 80 mm can take none of {names} out of it; "
-                    "choose narrower objects"
-                )
-
-    def choose(self, rng: np.random.RandomState, piece: int, name: str | None) -> int:
-        """An object for the piece of furniture: that of a name, or any.
-
-        Raises:
-          InputError: No object that goes there has this name.
-        """
-        usable = [i for i, ways in enumerate(self._own[piece]) if ways]
-        return self._pool.choose(rng, name, usable)
+        self._part = part
+        self._ways = [ways_into(asset, part) for asset in self._assets]
+        self._own = ways_out(self._assets[0], part) if taken else self._ways[0]
 
     def inside(
-        self,
-        rng: np.random.RandomState,
-        piece: int,
-        index: int,
-        *,
-        front: float,
-        room: float = 0.0,
+        self, rng: np.random.RandomState, *, front: float, room: float = 0.0
     ) -> tuple[Placement, Float[np.ndarray, "4 4"]]:
-        """A place for an object in the empty cavity, and `T_cavity_object` there.
+        """A place for the object in the empty cavity, and `T_cavity_object` there.
 
         Args:
           rng: Draws the way to lie and the place.
-          piece: Of furniture.
-          index: Of the object.
           front: At most this far from the open side [m].
           room: For fingers around it, towards walls and towards others [m].
         """
-        part = self._parts[piece]
-        ways = self._own[piece][index]
-        stable, yaw = ways[rng.randint(len(ways))]
-        lying = resting(self._assets[index], stable, yaw)
+        part = self._part
+        stable, yaw = self._own[rng.randint(len(self._own))]
+        lying = resting(self._assets[0], stable, yaw)
         placement = sample_placement(
             lying,
             _cavity(part),
@@ -253,34 +239,26 @@ class CavityPlacement:
         return Placement(placement.place, placement.reach + room), pose
 
     def beside(
-        self,
-        rng: np.random.RandomState,
-        piece: int,
-        index: int,
-        count: int,
-        placement: Placement | None = None,
+        self, rng: np.random.RandomState, count: int, placement: Placement | None = None
     ) -> dict[int, Float[np.ndarray, "4 4"]]:
-        """Up to `count` other objects in the cavity that leave room for one.
+        """Up to `count` other objects in the cavity that leave room for the object.
 
         Args:
           rng: Draws which and where.
-          piece: Of furniture.
-          index: The object for which there must be room.
           count: How many others at most.
-          placement: Where that object lies; None: room is kept for it somewhere near the open side.
+          placement: Where the object lies; None: room is kept for it somewhere near the open side.
 
         Returns:
           Their indices, with `T_cavity_object` of each.
         """
         if not count:
             return {}
-        part = self._parts[piece]
+        part = self._part
         if placement is None:
-            placement, _ = self.inside(rng, piece, index, front=_ROOM_FRONT)
+            placement, _ = self.inside(rng, front=_ROOM_FRONT)
         taken, found = [placement], {}
-        others = [i for i in self._fitting(piece) if i != index]
-        for other in rng.permutation(others)[:count]:
-            ways = self._ways[piece][other]
+        for other in 1 + rng.permutation(len(self._assets) - 1)[:count]:
+            ways = self._ways[other]
             stable, yaw = ways[rng.randint(len(ways))]
             lying = resting(self._assets[other], stable, yaw)
             place = sample_placement(lying, _cavity(part), taken, rng, outwards=outwards_of(part))
@@ -288,9 +266,6 @@ class CavityPlacement:
                 taken.append(place)
                 found[int(other)] = lying.pose(_cavity(part), place.place)
         return found
-
-    def _fitting(self, piece: int) -> list[int]:
-        return [i for i, ways in enumerate(self._ways[piece]) if ways]
 
 
 def outwards_of(part: MovingPart) -> Float[np.ndarray, "2"]:

@@ -8,12 +8,11 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import Float
 
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.cavity_placement import CavityPlacement, Placement
 from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion, Standing, side
 from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
-from manipose_mj.tasks.articulated.part_choice import PartChoice
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.config import EnvConfig, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject
 
@@ -24,8 +23,8 @@ class CavityTask(FurnitureTask):
     def __init__(
         self,
         objects: Sequence[Asset],
-        furniture: Sequence[Asset],
-        choice: PartChoice,
+        furniture: Asset,
+        part: MovingPart,
         config: TaskConfig,
         env_config: EnvConfig,
         *,
@@ -36,9 +35,9 @@ class CavityTask(FurnitureTask):
         """Build furniture and objects.
 
         Args:
-          objects: Of which an episode is about one.
-          furniture: Of which an episode uses one.
-          choice: The part in question.
+          objects: The first is what episodes are about; others may lie in the cavity.
+          furniture: That all episodes use.
+          part: Of it, the one in question, with a handle and a cavity.
           config: Of the task.
           env_config: Of the user.
           standing: Where the furniture stands.
@@ -46,12 +45,12 @@ class CavityTask(FurnitureTask):
           taken: Whether the object is taken out of the cavity, rather than put in.
 
         Raises:
-          InputError: An object fits no cavity, or a part has none.
+          InputError: An object does not fit the cavity.
         """
         super().__init__(config, env_config)
-        self.pieces = FurnitureInQuestion(self.scene, furniture, choice, standing, hollow=True)
+        self.pieces = FurnitureInQuestion(self.scene, (furniture,), (part,), standing)
         self.pool = self.scene.add_objects(objects)
-        self.placement = CavityPlacement(self.pool, self.pieces.parts, taken=taken)
+        self.placement = CavityPlacement(self.pool, part, taken=taken)
         self.max_fillers = max_fillers
 
     @property
@@ -62,46 +61,30 @@ class CavityTask(FurnitureTask):
         """`T_world_cavity` of the part in question."""
         return self.pieces.cavity_pose(physics, self._piece)
 
-    def sample_furniture_and_object(
-        self, rng: np.random.RandomState, spec: EpisodeSpec
-    ) -> tuple[PlacedFurniture, int]:
-        """Draw a piece, the index of an object for it, and where the piece stands with its parts shut."""
-        piece = int(rng.randint(len(self.pieces.entities)))
-        index = self.placement.choose(rng, piece, spec.object)
-        return self.pieces.sample(rng, piece), index
-
     def sample_place(
         self,
         rng: np.random.RandomState,
-        piece: int,
         x_range: tuple[float, float],
         y_range: tuple[float, float],
     ) -> Float[np.ndarray, "2"]:
         """A place on the table [m], y mirrored for doors hinged on the right."""
         place = np.array([rng.uniform(*x_range), rng.uniform(*y_range)])
-        place[1] *= side(self.pieces.parts[piece])
+        place[1] *= side(self.part)
         return place
 
     def sample_fillers(
-        self,
-        rng: np.random.RandomState,
-        piece: int,
-        index: int,
-        placement: Placement | None = None,
+        self, rng: np.random.RandomState, placement: Placement | None = None
     ) -> dict[int, Float[np.ndarray, "4 4"]]:
         """Draw other objects for the cavity.
 
         Args:
           rng: Draws how many, which and where.
-          piece: Of furniture.
-          index: Of the object that the episode is about.
-          placement: Where that lies in the cavity; None: room is kept for it.
+          placement: Where the object lies in the cavity; None: room is kept for it.
 
         Returns:
           Their indices in the pool, with `T_cavity_object` of each.
         """
-        count = int(rng.randint(self.max_fillers + 1))
-        return self.placement.beside(rng, piece, index, count, placement)
+        return self.placement.beside(rng, int(rng.randint(self.max_fillers + 1)), placement)
 
     def cavity_of(self, preview: Preview, furniture: PlacedFurniture) -> Float[np.ndarray, "4 4"]:
         """`T_world_cavity` of the part in question while a piece stands so."""
@@ -110,7 +93,6 @@ class CavityTask(FurnitureTask):
 
 
 def placed_objects(
-    index: int,
     pose: Float[np.ndarray, "4 4"],
     fillers: Mapping[int, Float[np.ndarray, "4 4"]],
     cavity: Float[np.ndarray, "4 4"],
@@ -118,8 +100,7 @@ def placed_objects(
     """The object that an episode is about, and those that lie in the cavity, by name.
 
     Args:
-      index: Of the object.
-      pose: `T_world_object` of it.
+      pose: `T_world_object` of the object, the first of the pool.
       fillers: `T_cavity_object` of the others by their indices.
       cavity: `T_world_cavity`.
     """
@@ -127,4 +108,4 @@ def placed_objects(
         f"filler_{k}": PlacedObject(i, cavity @ inside)
         for k, (i, inside) in enumerate(fillers.items())
     }
-    return {"object": PlacedObject(index, pose), **others}
+    return {"object": PlacedObject(0, pose), **others}

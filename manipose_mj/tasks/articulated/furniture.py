@@ -13,7 +13,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.mjcf.objects import ArticulatedObject
 from manipose_mj.poses import rotation_about
-from manipose_mj.tasks.articulated.part_choice import PartChoice, choose_part, kind_of
+from manipose_mj.tasks.articulated.part_choice import kind_of
 from manipose_mj.tasks.core.scene import Scene
 from manipose_mj.tasks.core.start import PlacedFurniture
 from manipose_mj.tasks.observations.frames import BodyFrame, part_frames
@@ -50,25 +50,22 @@ class FurnitureInQuestion:
         self,
         scene: Scene,
         assets: Sequence[Asset],
-        choice: PartChoice,
+        parts: Sequence[MovingPart],
         standing: Standing,
-        *,
-        hollow: bool,
     ) -> None:
         """Add furniture to a scene.
 
         Args:
           scene: Has none yet.
           assets: Of which an episode uses one.
-          choice: The part in question.
+          parts: The part in question of each, with a handle.
           standing: Where a piece stands.
-          hollow: Whether the part has to give access to a cavity.
 
         Raises:
-          InputError: There is no asset, or one of them has no such part.
+          InputError: There is no asset, or one of them is rigid.
         """
         self.standing = standing
-        self.parts = tuple(choose_part(asset, choice, hollow=hollow) for asset in assets)
+        self.parts = tuple(parts)
         self.entities: tuple[ArticulatedObject, ...] = scene.add_furniture(
             assets, plinth=standing.plinth
         ).entities
@@ -107,14 +104,3 @@ class FurnitureInQuestion:
 def side(part: MovingPart) -> float:
     """-1 for a door hinged on the right as seen from the front, which opens to that side; else 1."""
     return -1.0 if kind_of(part) == "door" and part.joint.axis[2] > 0 else 1.0
-
-
-def split_objects(
-    objects: tuple[Asset, ...] | None,
-) -> tuple[tuple[Asset, ...], tuple[Asset, ...]]:
-    """A user's objects as furniture and rigid objects; empty where none of a kind is named."""
-    own = objects or ()
-    return (
-        tuple(asset for asset in own if asset.kind == "articulated"),
-        tuple(asset for asset in own if asset.kind == "rigid"),
-    )

@@ -33,6 +33,10 @@ class FurnitureTask(ManipulationTask):
         return self.pieces.parts[self._piece]
 
     @property
+    def observed_furniture(self) -> tuple[ArticulatedObject, ...]:
+        return ()  # but for the part in question, which every piece has
+
+    @property
     def extra_frames(self) -> Mapping[str, BodyFrame]:
         return self.pieces.frames(self._piece)
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from manipose_mj.assets.asset import Asset
-from manipose_mj.errors import unknown_name
+from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion, Standing
 from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
-from manipose_mj.tasks.articulated.part_choice import PartChoice
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
 from manipose_mj.tasks.goals import Goal, OpenGoal, ShutGoal
+from manipose_mj.tasks.observations.frames import BodyFrame
 
 
 @dataclass(frozen=True)
@@ -40,35 +39,32 @@ class OpenClose(FurnitureTask):
 
     def __init__(
         self,
-        furniture: Sequence[Asset],
-        choice: PartChoice,
+        furniture: Asset,
+        part: MovingPart,
         env_config: EnvConfig,
         config: OpenCloseConfig | None = None,
     ) -> None:
         self.task_config = config or OpenCloseConfig()
         super().__init__(self.task_config, env_config)
         self.pieces = FurnitureInQuestion(
-            self.scene, furniture, choice, self.task_config.standing, hollow=False
+            self.scene, (furniture,), (part,), self.task_config.standing
         )
+
+    @property
+    def extra_frames(self) -> Mapping[str, BodyFrame]:
+        # Not every part has a cavity.
+        frames = super().extra_frames
+        return {name: frames[name] for name in ("handle", "joint")}
 
     def sample(
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
-        piece = self._choose(rng, spec.object)
         opening = float(rng.uniform(*config.start_open)) if config.requested == "shut" else 0.0
-        part = self.pieces.parts[piece].name
+        part = self.part.name
         goal: Goal = (
             OpenGoal(part, config.fraction)
             if config.requested == "open"
             else ShutGoal(part, config.fraction)
         )
-        return EpisodeStart(goals=(goal,), furniture=(self.pieces.sample(rng, piece, opening),))
-
-    def _choose(self, rng: np.random.RandomState, name: str | None) -> int:
-        names = [entity.asset.name for entity in self.pieces.entities]
-        if name is None:
-            return int(rng.randint(len(names)))
-        if name not in names:
-            raise unknown_name("object", name, names)
-        return names.index(name)
+        return EpisodeStart(goals=(goal,), furniture=(self.pieces.sample(rng, 0, opening),))

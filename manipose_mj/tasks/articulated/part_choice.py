@@ -1,18 +1,17 @@
-"""Which drawer or door of a piece of furniture a task is about."""
+"""Which drawers or doors of a piece of furniture a task may be about."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 
 PartKind = Literal["drawer", "door", "flap"]
 Level = Literal["top", "middle", "bottom"]
-# How many parts of a kind there must be for a level to mean something.
+_ONE_ROW = 0.03  # handles whose heights differ by less are at one level [m]
+# How many rows of a kind there must be for a level to mean something.
 _LEAST: dict[Level, int] = {"top": 1, "middle": 3, "bottom": 1}
 
 
@@ -23,7 +22,7 @@ class PartChoice:
     Attributes:
       kinds: What it may be, the best first: a drawer slides, a door turns about the vertical, a flap
         about a level axis.
-      level: Which of those, by the height of their handles; None: the one with the largest cavity.
+      level: Which rows of those, by the height of their handles; None: all.
     """
 
     kinds: tuple[PartKind, ...]
@@ -41,43 +40,65 @@ def kind_of(part: MovingPart) -> PartKind:
     return "door" if abs(part.joint.axis[2]) > 0.7 else "flap"
 
 
-def choose_part(asset: Asset, choice: PartChoice, *, hollow: bool) -> MovingPart:
-    """The part of an asset that a task asks for.
+def possible_parts(asset: Asset, choice: PartChoice, *, hollow: bool) -> tuple[MovingPart, ...]:
+    """The parts of an asset that a task may be about: all of the best kind that it has, at the level asked for.
 
     Args:
       asset: An articulated one.
       choice: What to look for.
-      hollow: Whether it must give access to a cavity.
+      hollow: Whether they must give access to a cavity.
 
     Raises:
-      InputError: There is none, or it has no handle or no cavity.
+      InputError: There is none, or none has a handle or a cavity.
     """
     if asset.kind != "articulated":
         raise InputError(f"{asset.folder}: is a {asset.kind} asset; expected an articulated one")
     known = ", ".join(f"{p.name} ({kind_of(p)})" for p in asset.parts) or "none"
     handled = [part for part in asset.parts if part.handle is not None]
     for kind in choice.kinds:
-        found = [part for part in handled if kind_of(part) == kind]
-        if len(found) < (1 if choice.level is None else _LEAST[choice.level]):
+        rows = _rows([part for part in handled if kind_of(part) == kind])
+        if len(rows) < (1 if choice.level is None else _LEAST[choice.level]):
             continue
-        part = _pick(found, choice.level)
-        if hollow and part.cavity is None:
+        found = _at_level(rows, choice.level)
+        if not hollow:
+            return found
+        parts = tuple(part for part in found if part.cavity is not None)
+        if not parts:
+            names = ", ".join(repr(part.name) for part in found)
             raise InputError(
-                f"{asset.folder}: part {part.name!r} opens no cavity; this task needs one to hold things"
+                f"{asset.folder}: part {names} opens no cavity; this task needs one to hold things"
             )
-        return part
+        return parts
     raise InputError(f"{asset.folder}: has no {choice} with a handle; its parts: {known}")
 
 
-def _pick(found: list[MovingPart], level: Level | None) -> MovingPart:
+def named_part(asset: Asset, name: str) -> MovingPart:
+    """The part of an asset that has this name.
+
+    Raises:
+      InputError: There is none; the nearest names are offered.
+    """
+    parts = {part.name: part for part in asset.parts}
+    if name not in parts:
+        raise unknown_name(f"part of {asset.name}", name, parts)
+    return parts[name]
+
+
+def _rows(parts: list[MovingPart]) -> list[list[MovingPart]]:
+    """Parts side by side, with handles of one height, from the lowest row to the highest."""
+    rows: list[list[MovingPart]] = []
+    for part in sorted(parts, key=_handle_height):
+        if rows and _handle_height(part) - _handle_height(rows[-1][0]) < _ONE_ROW:
+            rows[-1].append(part)
+        else:
+            rows.append([part])
+    return rows
+
+
+def _at_level(rows: list[list[MovingPart]], level: Level | None) -> tuple[MovingPart, ...]:
     if level is None:
-        return max(found, key=_room)
-    upward = sorted(found, key=_handle_height)
-    return upward[{"bottom": 0, "middle": len(upward) // 2, "top": -1}[level]]
-
-
-def _room(part: MovingPart) -> float:
-    return 0.0 if part.cavity is None else float(np.prod(part.cavity.extents))
+        return tuple(part for row in rows for part in row)
+    return tuple(rows[{"bottom": 0, "middle": len(rows) // 2, "top": -1}[level]])
 
 
 def _handle_height(part: MovingPart) -> float:

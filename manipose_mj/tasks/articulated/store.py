@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.cavity_placement import starts
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
 from manipose_mj.tasks.articulated.furniture import Standing
-from manipose_mj.tasks.articulated.part_choice import PartChoice
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
@@ -46,17 +45,17 @@ class Store(CavityTask):
     def __init__(
         self,
         objects: Sequence[Asset],
-        furniture: Sequence[Asset],
-        choice: PartChoice,
+        furniture: Asset,
+        part: MovingPart,
         env_config: EnvConfig,
         config: StoreConfig | None = None,
     ) -> None:
-        """Raises InputError where an object fits no cavity, or a part has none."""
+        """Raises InputError where an object does not fit the cavity of the part."""
         self.task_config = config or StoreConfig()
         super().__init__(
             objects,
             furniture,
-            choice,
+            part,
             self.task_config,
             env_config,
             standing=self.task_config.standing,
@@ -68,17 +67,16 @@ class Store(CavityTask):
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
-        furniture, index = self.sample_furniture_and_object(rng, spec)
-        piece, asset = furniture.index, self.pool.entities[index].asset
+        furniture, asset = self.pieces.sample(rng, 0), self.pool.entities[0].asset
         possible = starts(asset)
         rest = possible[rng.randint(len(possible))]
-        xy = self.sample_place(rng, piece, config.x_range, config.y_range)
+        xy = self.sample_place(rng, config.x_range, config.y_range)
         pose = pose_on_table(asset, rest, xy, rng.uniform(-np.pi, np.pi))
-        fillers = self.sample_fillers(rng, piece, index)
+        fillers = self.sample_fillers(rng)
         cavity = self.cavity_of(preview, furniture)
-        part = self.pieces.parts[piece].name
+        part = self.part.name
         return EpisodeStart(
             goals=(InsideGoal("object", part), ShutGoal(part, config.shut)),
-            objects=placed_objects(index, pose, fillers, cavity),
+            objects=placed_objects(pose, fillers, cavity),
             furniture=(furniture,),
         )

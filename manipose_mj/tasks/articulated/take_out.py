@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.mjcf.markers.goal_area import GoalArea
 from manipose_mj.poses import compose
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
 from manipose_mj.tasks.articulated.furniture import Standing
-from manipose_mj.tasks.articulated.part_choice import PartChoice
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
@@ -49,17 +48,17 @@ class TakeOut(CavityTask):
     def __init__(
         self,
         objects: Sequence[Asset],
-        furniture: Sequence[Asset],
-        choice: PartChoice,
+        furniture: Asset,
+        part: MovingPart,
         env_config: EnvConfig,
         config: TakeOutConfig | None = None,
     ) -> None:
-        """Raises InputError where an object fits no cavity, or a part has none."""
+        """Raises InputError where an object does not fit the cavity of the part."""
         self.task_config = config or TakeOutConfig()
         super().__init__(
             objects,
             furniture,
-            choice,
+            part,
             self.task_config,
             env_config,
             standing=self.task_config.standing,
@@ -76,21 +75,18 @@ class TakeOut(CavityTask):
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
-        furniture, index = self.sample_furniture_and_object(rng, spec)
-        piece = furniture.index
-        center = self.sample_place(rng, piece, config.x_range, config.y_range)
-        placement, inside = self.placement.inside(
-            rng, piece, index, front=config.front, room=config.room
-        )
-        fillers = self.sample_fillers(rng, piece, index, placement)
+        furniture = self.pieces.sample(rng, 0)
+        center = self.sample_place(rng, config.x_range, config.y_range)
+        placement, inside = self.placement.inside(rng, front=config.front, room=config.room)
+        fillers = self.sample_fillers(rng, placement)
         cavity = self.cavity_of(preview, furniture)
-        part = self.pieces.parts[piece].name
+        part = self.part.name
         return EpisodeStart(
             goals=(
                 TakenOutGoal("object", part, center, np.array(config.area)),
                 ShutGoal(part, config.shut),
             ),
-            objects=placed_objects(index, cavity @ inside, fillers, cavity),
+            objects=placed_objects(cavity @ inside, fillers, cavity),
             furniture=(furniture,),
             # The middle of the goal area, Z up.
             fixtures={"goal": compose(np.eye(3), np.array([*center, 0.0]))},

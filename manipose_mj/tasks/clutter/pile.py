@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.asset import Asset
-from manipose_mj.errors import InputError
 from manipose_mj.tasks.clutter.pile_layout import PileConfig, choose, drops
 from manipose_mj.tasks.clutter.pile_scene import PileScene
+from manipose_mj.tasks.core.start import NoStartError
 
-_ATTEMPTS = 80
+_ATTEMPTS = 12
 _DROP_GAP = 0.012  # between what falls next and what lies there already [m]
 _DROP_SPEED = 0.5  # downwards, to begin with [m/s]
 _FALL_TIME = 0.4  # until the next one falls [s]
@@ -65,7 +65,7 @@ def settle(assets: Sequence[Asset], config: PileConfig, seed: int) -> Pile:
       seed: Of the choice of objects and of how they fall.
 
     Raises:
-      InputError: No pile of these came to rest where it should.
+      NoStartError: No pile of these came to rest where it should.
     """
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng((seed, attempt))
@@ -73,7 +73,7 @@ def settle(assets: Sequence[Asset], config: PileConfig, seed: int) -> Pile:
         if pile is not None:
             return pile
     names = ", ".join(asset.name for asset in assets)
-    raise InputError(
+    raise NoStartError(
         f"no pile of {config.count[0]} to {config.count[1]} of {names} comes to rest within "
         f"{config.spread} m; take objects that roll less or are smaller"
     )

@@ -24,21 +24,21 @@ from manipose_mj.tasks.clutter.pile_scene import (
 )
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
-from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start import EpisodeStart, NoStartError
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import Goal, PoseGoal
 from manipose_mj.tasks.scene.resting import pose_on_table, require_graspable
 
 TARGET_NAMES = ("object", "object_second", "object_third")
 _UP = np.array([0.0, 0.0, 1.0])
-_SAMPLES = 60  # of a pile and its place, before a reset gives up
+_SAMPLES = 20  # of a pile and its place, before a reset gives up
 _SLEEP_SPEED = 1e-3  # under which an island of touching things falls asleep [m/s]
 _PLACES = 200  # drawn for a goal before the pile is drawn anew
 
 
 @dataclass(frozen=True)
 class ClutterConfig(TaskConfig):
-    """Attributes: pile: how piles are dropped; piles: how many different ones there are; pile_x: where
+    """Attributes: pile: how piles are dropped; piles: how many different ones there are of the objects; pile_x: where
     the middle of the pile may be, along x [m]; pile_y: how far from the table's middle line, to
     either side [m]; goal_x, goal_y: the same of goals, on the other side of that line [m];
     room: between a goal and everything else, for the hand [m]; targets: least and largest number;
@@ -47,7 +47,7 @@ class ClutterConfig(TaskConfig):
 
     horizon: float = 90.0
     pile: PileConfig = field(default_factory=PileConfig)
-    piles: int = 16
+    piles: int = 4
     pile_x: tuple[float, float] = (0.47, 0.55)
     pile_y: tuple[float, float] = (0.12, 0.18)
     goal_x: tuple[float, float] = (0.36, 0.60)
@@ -142,7 +142,7 @@ class Clutter(ManipulationTask):
             goals = self._sample_goals(lying, targets, rng) if targets and named else None
             if goals is not None:
                 return self._start(lying, targets, goals)
-        raise InputError(
+        raise NoStartError(
             f"{type(self).__name__}: none of {self.task_config.piles} piles of these objects has a "
             f"target as the task wants it{f', {spec.object!r}' if spec.object else ''}; "
             "take more objects, or smaller ones"

@@ -32,9 +32,9 @@ class EnvConfig:
       control_mode: What actions mean, such as `"pd_joint_pos"`, `"pd_ee_delta_pose"` or `"primitive"`; the
         physics is the same for all.
       reward_mode: `"sparse"`, 1 while the goals are met; or `"dense"`, in [0, 1].
-      objects: Objects to use instead of the built-in ones: assets, names of built-in objects, asset folders,
-        or folders of asset folders.
-      split: Which built-in objects; train and test objects have nothing in common.
+      objects: Objects to draw from instead of the built-in ones: assets, names of built-in objects, asset
+        folders, or folders of asset folders.
+      split: Which built-in objects to draw from; train and test objects have nothing in common.
       randomisation: Name of a strength of domain randomisation.
       sensors: Cameras, images, clouds and their noise.
 
@@ -93,11 +93,16 @@ class EpisodeSpec:
 
     Attributes:
       seed: From which all that is random about it follows; None goes on from the episode before.
-      object: Name of the asset that it shall be about, one of the environment's; None draws one.
+      object: Name of the rigid asset that it shall be about, one of those that the environment draws from; None
+        draws one.
+      furniture: Name of the articulated asset, likewise.
+      part: Name of the drawer or door that it shall be about, likewise.
     """
 
     seed: int | None = None
     object: str | None = None
+    furniture: str | None = None
+    part: str | None = None
 
 
 @dataclass(frozen=True)

@@ -6,28 +6,43 @@ import importlib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from manipose_mj.errors import unknown_name
 from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects
 from manipose_mj.tasks.core.task import ManipulationTask
 
 
 class TaskFactory(Protocol):
-    """Builds a task from what its user chose."""
+    """Builds a task from what its user chose, with the same objects for all episodes."""
 
     def __call__(self, env_config: EnvConfig) -> ManipulationTask: ...
 
 
+class DrawnTaskFactory(Protocol):
+    """Builds a task from what its user chose and the objects that were drawn for an episode."""
+
+    def __call__(self, env_config: EnvConfig, objects: SceneObjects) -> ManipulationTask: ...
+
+
+Factory = TaskFactory | DrawnTaskFactory
+
+
 @dataclass(frozen=True)
 class TaskSpec:
-    """One registered task: its names, its factory, tags, and one line on what it asks for."""
+    """One registered task: its names, its factory, tags, and one line on what it asks for.
+
+    Attributes:
+      draws: Makes the draw of an episode's objects; None where all episodes have the same.
+    """
 
     domain: str
     name: str
-    factory: TaskFactory
+    factory: Factory
     tags: tuple[str, ...]
     summary: str
+    draws: ObjectDrawFactory | None = None
 
     @property
     def full_name(self) -> str:
@@ -54,9 +69,16 @@ _TASKS: dict[tuple[str, str], TaskSpec] = {}
 _listeners: list[Callable[[TaskSpec], None]] = []
 
 
+FactoryT = TypeVar("FactoryT", bound=Factory)
+
+
 def register_task(
-    domain: str, name: str, *, tags: tuple[str, ...] = ()
-) -> Callable[[TaskFactory], TaskFactory]:
+    domain: str,
+    name: str,
+    *,
+    tags: tuple[str, ...] = (),
+    draws: ObjectDrawFactory | None = None,
+) -> Callable[[FactoryT], FactoryT]:
     """Register the decorated factory as `domain/name`: for this package's tasks and for anybody's.
 
     Every front door then knows the task: `suite.load` and `suite.ALL_TASKS`; `dm_control.suite` after
@@ -67,6 +89,8 @@ def register_task(
       domain: The family.
       name: Lower case words joined by `_`, of which the Gymnasium id is made.
       tags: For `dm_control.suite`'s subsets.
+      draws: Where the objects differ from episode to episode: makes, for an environment, what draws them.
+        The factory then takes those that were drawn as a second argument, `objects`.
 
     The first line of the factory's docstring is the summary that `manipose list` shows; the rest goes
     to the task's card.
@@ -75,13 +99,13 @@ def register_task(
       ValueError: The name is taken, or the factory has no docstring.
     """
 
-    def decorate(factory: TaskFactory) -> TaskFactory:
+    def decorate(factory: FactoryT) -> FactoryT:
         if (domain, name) in _TASKS:
             raise ValueError(f"task {domain}/{name} is registered already")
         if not factory.__doc__:
             raise ValueError(f"the factory of {domain}/{name} needs a docstring")
         summary = factory.__doc__.strip().splitlines()[0]
-        spec = TaskSpec(domain, name, factory, tags, summary)
+        spec = TaskSpec(domain, name, factory, tags, summary, draws)
         for listener in _listeners:
             listener(spec)
         _TASKS[domain, name] = spec

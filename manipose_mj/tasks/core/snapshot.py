@@ -12,6 +12,8 @@ from dm_control import composer
 from jaxtyping import Float
 
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.environment import TaskEnvironment
+from manipose_mj.tasks.core.scene_objects import SceneObjects
 from manipose_mj.tasks.core.task import ManipulationTask
 
 # What an episode may change in a model: where fixed things stand, who has weight, randomisation.
@@ -74,6 +76,7 @@ class Snapshot:
       task: What the task remembers of this episode.
       random_state: Of the environment's one generator.
       ended: Whether the episode was over.
+      objects: Of the scene; None where all episodes have the same.
     """
 
     state: Float[np.ndarray, "n"]
@@ -85,6 +88,7 @@ class Snapshot:
     task: dict[str, Any]
     random_state: Any
     ended: bool
+    objects: SceneObjects | None = None
 
 
 def save(environment: composer.Environment) -> Snapshot:
@@ -106,11 +110,12 @@ def save(environment: composer.Environment) -> Snapshot:
         task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
         random_state=environment.random_state.get_state(),
         ended=environment._reset_next_step,
+        objects=getattr(environment, "scene_objects", None),
     )
 
 
 def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, np.ndarray]:
-    """Put an environment of the same task, options and objects back; what follows is the same.
+    """Put an environment of the same task and options back; what follows is the same.
 
     Returns:
       The observation of that moment.
@@ -118,6 +123,8 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     Raises:
       InputError: The environment has not been reset yet, or its model is another one.
     """
+    if snapshot.objects is not None and isinstance(environment, TaskEnvironment):
+        environment.use(snapshot.objects)
     task, model, data = _parts(environment)
     expected = mujoco.mj_stateSize(model, _STATE)
     shapes = {name: getattr(model, name).shape for name in _MODEL_FIELDS}

@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.errors import InputError
 from manipose_mj.tasks.goals import Goal
+
+
+class NoStartError(InputError):
+    """No start can be drawn with the objects of a scene; with others there may be one."""
 
 
 @dataclass(frozen=True)

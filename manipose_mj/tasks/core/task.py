@@ -103,6 +103,11 @@ class ManipulationTask(composer.Task):
         return ()
 
     @property
+    def observed_furniture(self) -> tuple[ArticulatedObject, ...]:
+        """The furniture of which every drawer and door is observed, by its name."""
+        return self.scene.articulated_objects
+
+    @property
     def extra_frames(self) -> Mapping[str, BodyFrame]:
         """More frames to observe, such as those of the part in question; of one set of names."""
         return {}
@@ -224,7 +229,7 @@ class ManipulationTask(composer.Task):
 
     def add_sensors(self) -> None:
         """Add cameras and observables to the complete scene; `TaskEnvironment` does it, once."""
-        slots = Slots(self.observed_objects, self.observed_goals, self.scene.articulated_objects)
+        slots = Slots(self.observed_objects, self.observed_goals, self.observed_furniture)
         self._sensors = SensorObservables(
             self,
             slots,

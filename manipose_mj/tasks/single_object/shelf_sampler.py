@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from manipose_mj.assets.asset import Asset
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import compose, invert
+from manipose_mj.tasks.core.start import NoStartError
 from manipose_mj.tasks.single_object.grasp_room import grasps_with_room
 from manipose_mj.tasks.single_object.shelf_places import ShelfPlaces, Zone
 
@@ -57,9 +58,9 @@ class ShelfSampler:
         Where no pair of poses with enough grasps turns up, the best of those drawn.
 
         Raises:
-          InputError: The object fits the zones in none of its stable poses.
+          NoStartError: The object fits the zones in none of its stable poses, or no grasp serves.
         """
-        best, most = None, -1
+        best, most = None, 0
         for _ in range(_MAX_DRAWS):
             start_zone = self.starts[random_state.randint(len(self.starts))]
             goal_zone = self.goals[random_state.randint(len(self.goals))]
@@ -79,7 +80,10 @@ class ShelfSampler:
             if most >= _ENOUGH:
                 break
         if best is None:
-            raise InputError(f"{asset.folder}: {asset.name} fits the shelf in no stable pose")
+            raise NoStartError(
+                f"{asset.folder}: {asset.name} fits the shelf in no stable pose in which a hand can take it "
+                "at the start and let it go at the goal"
+            )
         return best
 
     def _with_room(

@@ -55,7 +55,7 @@ class TargetPose(SingleObjectTask):
     ) -> None:
         self.task_config = config = config or TargetPoseConfig()
         super().__init__(assets, config, env_config)
-        self._pairs = [_pose_pairs(asset, config) for asset in assets]
+        self._pairs = [pose_pairs(asset, config) for asset in assets]
         self._at_shelf = None
         if config.places is not None:
             self.shelf = Shelf(config.places.shelf)
@@ -98,7 +98,7 @@ class TargetPose(SingleObjectTask):
                 return start, goal
 
 
-def _pose_pairs(asset: Asset, config: TargetPoseConfig) -> list[tuple[int, int]]:
+def pose_pairs(asset: Asset, config: TargetPoseConfig) -> list[tuple[int, int]]:
     """Pairs of stable poses that one grasp may serve.
 
     Raises:

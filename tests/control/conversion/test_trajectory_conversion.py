@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from dm_control import composer
 
-from manipose_mj import suite
 from manipose_mj.actions import CONTROL_MODES, control_mode
 from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
@@ -19,6 +18,7 @@ from manipose_mj.control.conversion.convert import convert
 from manipose_mj.control.conversion.recording import Recording, record, replay
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+from tests.few_objects import load
 
 SCRIPT = Path(__file__).parents[3] / "benchmarks" / "trajectory_conversion.py"
 # Of the TCP at the end of a converted recording [m]; ends wait for the arm.
@@ -27,7 +27,7 @@ END = 0.002
 
 def _environment(category: str) -> composer.Environment:
     objects = [catalogue.load(category, 0)]
-    return suite.load("single_object", "target_pose", seed=0, obs_mode="state", objects=objects)
+    return load("single_object", "target_pose", seed=0, obs_mode="state", objects=objects)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.grasping.handle_grasps import (
     Push,
@@ -24,7 +23,8 @@ from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.poses import invert, rotation_angle
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.config import EpisodeSpec
+from tests.few_objects import config, load
 
 # Seeds for which the baseline, with true poses, is known to do it.
 SOLVED = {
@@ -41,7 +41,7 @@ SOLVED = {
 
 @pytest.fixture(scope="module", params=["open_cabinet_door", "open_oven"])
 def scene(request) -> tuple[MotionPlanner, SceneEstimate, PartEstimate]:
-    environment = suite.load("articulated", request.param, seed=0, obs_mode="state")
+    environment = load("articulated", request.param, seed=0, obs_mode="state")
     environment.reset()
     baseline = Baseline(environment)
     estimate = baseline.perception.observe()
@@ -135,7 +135,7 @@ def test_the_way_out_of_a_cavity_behind_a_door_is_through_its_mouth(scene):
 @pytest.mark.parametrize("task", SOLVED)
 def test_the_baseline_does_it(task):
     result, _ = run_episode(
-        EnvConfig(f"articulated/{task}", obs_mode="state"), EpisodeSpec(SOLVED[task])
+        config(f"articulated/{task}", obs_mode="state"), EpisodeSpec(SOLVED[task])
     )
     assert result.success_at_end, (result.failure, result.reason)
     assert result.max_penetration < 0.003

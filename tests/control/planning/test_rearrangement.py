@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
@@ -14,8 +13,9 @@ from manipose_mj.control.planning.table_places import is_free
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import episode
 from manipose_mj.poses import compose, invert
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.goals import PoseGoal
+from tests.few_objects import config, load
 
 SEED = 1
 
@@ -23,7 +23,7 @@ SEED = 1
 @pytest.fixture(scope="module")
 def stacked():
     """Environment, perception and planner of one stack."""
-    environment = suite.load("clutter", "stacked", seed=SEED, obs_mode="state")
+    environment = load("clutter", "stacked", seed=SEED, obs_mode="state")
     environment.random_state.seed(SEED)
     environment.reset()
     task = environment.task
@@ -96,8 +96,6 @@ def test_a_motion_that_does_not_touch_the_pile_ignores_its_own_contacts(stacked)
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("task", "seed"), [("pick", 2), ("multi", 3), ("stacked", 24)])
 def test_the_baseline_succeeds(task, seed):
-    result, _ = episode.run_episode(
-        EnvConfig(f"clutter/{task}", obs_mode="state"), EpisodeSpec(seed)
-    )
+    result, _ = episode.run_episode(config(f"clutter/{task}", obs_mode="state"), EpisodeSpec(seed))
     assert result.success_at_end, result.reason
     assert result.max_penetration < 0.005

@@ -7,7 +7,6 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution.recovery import nearest_rests
@@ -26,9 +25,10 @@ from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.evaluation import episode
 from manipose_mj.mjcf.sleep import sleep_disabled
 from manipose_mj.poses import compose, invert, rotation_about
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.goals import OrientationGoal, PoseGoal, UprightGoal
 from manipose_mj.tasks.scene.resting import label_ups, pose_on_table
+from tests.few_objects import config, load
 
 UP = np.array([0.0, 0.0, 1.0])
 ANYTHING = np.array([0.5, 0.05])
@@ -39,7 +39,7 @@ class Scene:
 
     def __init__(self) -> None:
         mug = catalogue.load("mug", 0)
-        self.environment = suite.load(
+        self.environment = load(
             "single_object", "reorient_mug", seed=0, obs_mode="state", objects=[mug]
         )
         self.environment.reset()
@@ -162,7 +162,7 @@ def test_what_is_nearest_in_hand_keeps_its_side_and_its_turn(scene):
 )
 def test_the_baseline_succeeds_with_as_many_placements_as_it_needs(task, seed, releases):
     result, trajectory = episode.run_episode(
-        EnvConfig(f"single_object/{task}", obs_mode="state"), EpisodeSpec(seed)
+        config(f"single_object/{task}", obs_mode="state"), EpisodeSpec(seed)
     )
     assert result.success_at_end, (result.failure, result.reason)
     notes = trajectory.annotations

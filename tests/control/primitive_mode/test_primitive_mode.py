@@ -8,7 +8,6 @@ import dm_env
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.actions import control_mode
 from manipose_mj.assets import catalogue
 from manipose_mj.control.conversion.recording import acting
@@ -21,6 +20,7 @@ from manipose_mj.control.primitive_mode.tcp_primitives import Status
 from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, pose_to_vector, rotation_about, rotation_angle
 from manipose_mj.tasks.core import snapshot
+from tests.few_objects import load
 
 MOVE, GRASP, RELEASE = 0.0, 1.0, 2.0
 SEED = 0
@@ -29,7 +29,7 @@ SEED = 0
 @pytest.fixture(scope="module")
 def built() -> PrimitiveEnvironment:
     objects = [catalogue.load("box", 0)]
-    environment = suite.load(
+    environment = load(
         "single_object", "target_pose", seed=0, obs_mode="state+pose", objects=objects
     )
     return PrimitiveEnvironment(environment, PrimitiveConfig(max_primitives=4))
@@ -118,8 +118,8 @@ def test_move_to_brings_the_tcp_there_with_and_without_a_load(primitives):
     goal = _tcp(primitives)
     goal[:3, 3] += [0.03, 0.2, 0.1]
     goal[:3, :3] = rotation_about(np.array([0.0, 0, 1]), 0.5) @ goal[:3, :3]
-    for load in (False, True):
-        if load:
+    for loaded in (False, True):
+        if loaded:
             assert _take(primitives).observation[STATUS] == Status.DONE
         timestep = primitives.step(np.append(MOVE, pose_to_vector(goal)))
         assert timestep.observation[STATUS] == Status.DONE

@@ -18,11 +18,12 @@ from manipose_mj import suite
 from manipose_mj.mjcf.cameras import gl
 from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from tests.places import ROOT
+from tests.few_objects import load
 gl.activate()
 option = mujoco.MjvOption()
 option.geomgroup[:] = [1, 1, 1, 0, 0, 0]
 for task in (("single_object", "target_pose"), ("articulated", "store_chips_can_middle_drawer")):
-    environment = suite.load(*task, seed=3, obs_mode="state")
+    environment = load(*task, seed=3, obs_mode="state")
     environment.reset()
     model, data = environment.physics.model.ptr, environment.physics.data.ptr
     with mujoco.Renderer(model, 240, 320) as renderer:

@@ -14,6 +14,7 @@ from manipose_mj.tasks.clutter.occluded import CAMERAS
 from manipose_mj.tasks.clutter.task import Clutter
 from manipose_mj.tasks.goals import OnTableGoal, PoseGoal
 from manipose_mj.tasks.observations.visibility import visible_share
+from tests.few_objects import load
 
 TASKS = ("pick", "multi", "stacked", "occluded")
 # Few, and the same for all: each may have to drop its pile first.
@@ -27,7 +28,7 @@ def environments():
 
     def get(name: str):
         if name not in made:
-            made[name] = suite.load("clutter", name, seed=0, obs_mode="state")
+            made[name] = load("clutter", name, seed=0, obs_mode="state")
         return made[name]
 
     return get
@@ -165,7 +166,7 @@ def test_no_camera_sees_more_than_two_fifths_of_the_occluded_target(environments
 
 
 def test_the_names_observed_are_the_same_in_every_episode(environments):
-    environment = suite.load("clutter", "multi", seed=0, obs_mode="pose")
+    environment = load("clutter", "multi", seed=0, obs_mode="pose")
     keys = []
     for seed in SEEDS[:2]:
         environment.random_state.seed(seed)

@@ -10,6 +10,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.tasks.core.randomisation import STRENGTHS, Delay
 from manipose_mj.tasks.core.snapshot import restore, save
+from tests.few_objects import load
 
 TASK = ("single_object", "target_pose")
 HOLD = np.append(HOME, MAX_OPENING)
@@ -27,9 +28,7 @@ FIELDS = {
 
 @pytest.fixture(scope="module")
 def environments():
-    found = {
-        name: suite.load(*TASK, seed=0, obs_mode="state", randomisation=name) for name in STRENGTHS
-    }
+    found = {name: load(*TASK, seed=0, obs_mode="state", randomisation=name) for name in STRENGTHS}
     for environment in found.values():
         environment.reset()
     return found
@@ -40,7 +39,7 @@ def _fields(environment) -> dict[str, np.ndarray]:
 
 
 def test_it_is_off_by_default(environments):
-    plain = suite.load(*TASK, seed=0, obs_mode="state")
+    plain = load(*TASK, seed=0, obs_mode="state")
     plain.reset()
     before = _fields(plain)
     plain.reset()
@@ -100,7 +99,7 @@ def test_strengths_do_not_pile_up(environments):
 def test_the_same_seed_gives_the_same_world_and_episode():
     runs = []
     for _ in range(2):
-        environment = suite.load(*TASK, seed=7, obs_mode="state", randomisation="strong")
+        environment = load(*TASK, seed=7, obs_mode="state", randomisation="strong")
         environment.reset()
         for _ in range(10):
             environment.step(HOLD)
@@ -124,7 +123,7 @@ def test_targets_come_late_and_are_restored_under_way():
     delay.start(3, np.zeros(8))
     arrived = [delay.through(np.full(8, float(i)))[0] for i in range(1, 7)]
     assert arrived == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
-    environment = suite.load(*TASK, seed=1, obs_mode="state", randomisation="strong")
+    environment = load(*TASK, seed=1, obs_mode="state", randomisation="strong")
     environment.reset()
     assert len(environment.task._delay.waiting) > 0
     moved = HOLD + np.append(np.full(7, 0.1), -0.02)

@@ -13,6 +13,7 @@ from manipose_mj import suite
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.tasks.core.snapshot import restore, save
+from tests.few_objects import load
 
 STEPS, SAVED_AT = 40, (0, 13, 39)
 
@@ -30,7 +31,7 @@ def _bits(environment, step) -> list[bytes]:
 
 
 def _load(task, seed):
-    return suite.load(*task, seed=seed, obs_mode="state+pose", reward_mode="dense")
+    return load(*task, seed=seed, obs_mode="state+pose", reward_mode="dense")
 
 
 @pytest.mark.sample(6)

@@ -20,6 +20,7 @@ from manipose_mj.tasks.goals import (
     progress,
 )
 from manipose_mj.tasks.scene.state import ObjectState, PartState, SceneState
+from tests.few_objects import load
 
 TOLERANCE = Tolerance()
 BOX = (np.array([0.1, 0.06, 0.06]), SymmetryGroup.identity())
@@ -140,9 +141,7 @@ def test_numpy_and_jax_agree_on_batches():
 
 
 def test_it_rises_along_a_success_of_the_baseline():
-    environment = suite.load(
-        "single_object", "target_pose", 1, obs_mode="state", reward_mode="dense"
-    )
+    environment = load("single_object", "target_pose", 1, obs_mode="state", reward_mode="dense")
     environment.reset()
     rewards = [environment.step(action).reward for action in Baseline(environment).actions(1)]
     assert environment.task.success_now and rewards[-1] == 1.0

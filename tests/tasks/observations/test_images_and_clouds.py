@@ -7,12 +7,12 @@ import time
 import numpy as np
 import pytest
 
-from manipose_mj import suite
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras import gl
 from manipose_mj.poses import compose, invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensors import SensorConfig
+from tests import few_objects
 from tests.tasks.observed_scenes import ABOVE, STORE, TARGET_POSE, load
 
 
@@ -117,7 +117,7 @@ def test_normals_of_a_noisy_cloud_are_near_the_true_ones():
 
 def test_the_cloud_of_three_cameras_is_quick():
     """Some 20 ms on one idle core; the bound allows for a busy machine."""
-    environment = suite.load(*STORE, seed=0, obs_mode="pointcloud/points")
+    environment = few_objects.load(*STORE, seed=0, obs_mode="pointcloud/points")
     environment.reset()
     task, times = environment.task, []
     for _ in range(4):

@@ -15,6 +15,7 @@ from manipose_mj.tasks.articulated.take_out import TakeOut
 from manipose_mj.tasks.clutter.task import Clutter
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensors import SensorConfig
+from tests.few_objects import load
 from tests.tasks.contact import touches_robot
 from tests.tasks.episode_driver import HOLD, hold, reset, wander
 
@@ -28,7 +29,7 @@ POINT_TOLERANCE = 0.005  # of the object's bounding box around its points [m]
 @pytest.fixture(scope="module", params=suite.ALL_TASKS, ids="/".join)
 def environment(request) -> composer.Environment:
     """One environment a task, with every sensor; tests reset it themselves."""
-    return suite.load(*request.param, seed=0, obs_mode=EVERYTHING, sensors=SENSORS)
+    return load(*request.param, seed=0, obs_mode=EVERYTHING, sensors=SENSORS)
 
 
 @pytest.mark.sample(8)
@@ -66,7 +67,7 @@ def test_every_mode_has_its_shapes_and_types(environment):
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", ["state", "pose", "depth", "segmentation", "pointcloud"])
 def test_only_the_modes_asked_for_are_shown(mode):
-    observation = suite.load(*STORE, seed=0, obs_mode=mode, sensors=SENSORS).reset().observation
+    observation = load(*STORE, seed=0, obs_mode=mode, sensors=SENSORS).reset().observation
     found = {name.split("/")[0] for name in observation} - {"camera"}  # images bring their cameras
     assert found == {"panda" if mode == "state" else mode}
 
@@ -84,7 +85,7 @@ def test_instances_name_what_segmentation_shows(environment):
 def test_unused_objects_stay_parked_and_out_of_sight():
     cameras = ("front", "left", "right", "overview", "panda/wrist")
     sensors = SensorConfig(cameras=cameras, height=60, width=80)
-    environment = suite.load(*TARGET_POSE, seed=0, obs_mode="segmentation", sensors=sensors)
+    environment = load(*TARGET_POSE, seed=0, obs_mode="segmentation", sensors=sensors)
     for seed in range(3):
         task = reset(environment, seed)
         hold(environment, 0.2)
@@ -104,7 +105,7 @@ def test_unused_objects_stay_parked_and_out_of_sight():
 
 
 def test_the_goal_marker_is_neither_seen_nor_touched():
-    environment = suite.load(*TARGET_POSE, seed=0, obs_mode="depth", sensors=SENSORS)
+    environment = load(*TARGET_POSE, seed=0, obs_mode="depth", sensors=SENSORS)
     task = reset(environment, 2)
     marker = task.scene.fixtures["goal"]
     before = environment.step(HOLD).observation["depth/front"]

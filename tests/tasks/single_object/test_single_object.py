@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from dm_control import composer
 
-from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.mjcf.sleep import sleep_disabled
 from manipose_mj.poses import compose, invert, pose_error, rotation_about
-from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.goals import OrientationGoal
 from manipose_mj.tasks.scene.resting import (
     label_ups,
@@ -25,7 +23,6 @@ from manipose_mj.tasks.scene.resting import (
     require_graspable,
     usable_poses,
 )
-from manipose_mj.tasks.single_object import registered as single_object
 from manipose_mj.tasks.single_object.grasp_room import grasps_with_room
 from manipose_mj.tasks.single_object.orientation import orientation_pairs
 from manipose_mj.tasks.single_object.position import IntoShelfConfig, PositionConfig
@@ -33,6 +30,7 @@ from manipose_mj.tasks.single_object.reorient import tipped_poses
 from manipose_mj.tasks.single_object.shelf_places import ShelfPlaces
 from manipose_mj.tasks.single_object.shelf_sampler import ShelfSampler
 from manipose_mj.tasks.single_object.target_pose import TargetPose, TargetPoseConfig
+from tests.few_objects import config, load
 
 HOLD = np.append(HOME, MAX_OPENING)
 UP = np.array([0.0, 0.0, 1.0])
@@ -45,7 +43,7 @@ def mug() -> Asset:
 
 
 def _environment(task: str, **arguments) -> composer.Environment:
-    return suite.load("single_object", task, seed=0, obs_mode="state", **arguments)
+    return load("single_object", task, seed=0, obs_mode="state", **arguments)
 
 
 @pytest.fixture(scope="module")
@@ -287,12 +285,12 @@ def test_a_hand_has_room_in_front_of_a_level_and_none_through_a_board():
 
 
 def test_zones_that_the_shelf_lacks_are_refused(mug):
-    config = EnvConfig("single_object/position")
+    env_config = config("single_object/position")
     with pytest.raises(InputError, match="unknown zone 'inn'"):
-        TargetPose((mug,), config, TargetPoseConfig(places=PLACES, starts=("inn",)))  # type: ignore[arg-type]
+        TargetPose((mug,), env_config, TargetPoseConfig(places=PLACES, starts=("inn",)))  # type: ignore[arg-type]
     low = ShelfPlaces(shelf=replace(PLACES.shelf, boards=(0.33,)))
     with pytest.raises(InputError, match="'in' lies between two boards"):
-        TargetPose((mug,), config, TargetPoseConfig(places=low, goals=("in",)))
+        TargetPose((mug,), env_config, TargetPoseConfig(places=low, goals=("in",)))
 
 
 def test_an_object_that_fits_no_zone_is_refused(mug):
@@ -322,16 +320,6 @@ REFERENCE = [
     [0.57318, -0.26466, 0.0627, 0.52750, -0.04631, 0.0627],
     [0.58494, 0.25073, 0.125, 0.48664, -0.10050, 0.03748],
 ]
-
-
-def test_test_objects_are_none_of_the_training_objects(monkeypatch):
-    monkeypatch.setattr(catalogue, "load", lambda category, index: f"{category} {index}")
-    for count in (2, 4):
-        train, test = (
-            set(single_object._objects(EnvConfig("", split=split), ("mug", "box"), count))
-            for split in ("train", "test")
-        )
-        assert len(train) == len(test) == 2 * count and not train & test
 
 
 def test_own_objects_are_used():

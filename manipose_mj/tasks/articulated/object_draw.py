@@ -1,0 +1,190 @@
+"""Draws the furniture of an episode, the part of it in question, and the objects that go with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from manipose_mj.assets.asset import Asset, MovingPart
+from manipose_mj.assets.categories import CATALOGUE, Category, Split
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.articulated.cavity_placement import ways_into, ways_out
+from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part, possible_parts
+from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, chosen, rigid_rows
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects, Strata
+from manipose_mj.tasks.scene.resting import require_graspable
+
+_PIECES = 30  # that are looked at for one with a cavity that something fits
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a task with furniture is about.
+
+    Attributes:
+      categories: Of built-in furniture.
+      choice: Of the parts.
+      stored: Categories of built-in objects that are stored; None: every rigid one.
+    """
+
+    categories: tuple[str, ...]
+    choice: PartChoice
+    stored: tuple[str, ...] | None = None
+
+
+class FurnitureDraw:
+    """A piece of furniture and a part of it."""
+
+    def __init__(self, wanted: Wanted, env_config: EnvConfig, *, hollow: bool) -> None:
+        """Loads what the user chose; of that, furniture takes the place of the built-in pieces."""
+        own = _own(env_config, rigid=False)
+        rows = [CATALOGUE[name] for name in wanted.categories]
+        pool = own or builtin(env_config.split, rows)
+        self._parts = partial(possible_parts, choice=wanted.choice, hollow=hollow)
+        self.pieces = Candidates(pool, self._parts)
+
+    def draw(self, rng: np.random.RandomState, spec: EpisodeSpec) -> tuple[Asset, MovingPart]:
+        """Raises InputError where no piece has such a part, or none of the names asked for."""
+        asset = self.pieces.draw(rng, spec.furniture)
+        possible = self._parts(asset)
+        if spec.part is None:
+            return asset, possible[rng.randint(len(possible))]
+        part = named_part(asset, spec.part)
+        names = [each.name for each in possible]
+        if part.name not in names:
+            raise InputError(
+                f"{asset.folder}: this task is about {', '.join(names)}; part {part.name!r} is none of them"
+            )
+        return asset, part
+
+    def strata(self) -> Strata:
+        """Pieces, each with its parts."""
+        names = [name for group in self.pieces.usable().values() for name in group]
+        unused = np.random.RandomState(0)  # nothing is drawn where a name is given
+        return tuple(
+            tuple(
+                EpisodeSpec(furniture=name, part=part.name)
+                for part in self._parts(self.pieces.draw(unused, name))
+            )
+            for name in names
+        )
+
+
+class PieceDraw(FurnitureDraw):
+    """For tasks that move a part and need nothing else."""
+
+    def __call__(self, rng: np.random.RandomState, spec: EpisodeSpec) -> SceneObjects:
+        asset, part = self.draw(rng, spec)
+        return SceneObjects((asset,), part.name)
+
+
+def furniture_alone(wanted: Wanted) -> ObjectDrawFactory:
+    """A draw for tasks that move a part and need nothing else."""
+
+    def make(env_config: EnvConfig) -> PieceDraw:
+        for asset in env_config.assets() or ():
+            if asset.kind != "articulated":
+                raise InputError(
+                    f"{asset.folder}: is a {asset.kind} asset; tasks that open or close take articulated ones"
+                )
+        return PieceDraw(wanted, env_config, hollow=False)
+
+    return make
+
+
+class CavityDraw:
+    """A piece, a part that shuts a cavity, an object for it, and others that fit as well."""
+
+    def __init__(self, wanted: Wanted, env_config: EnvConfig, *, taken: bool, fillers: int) -> None:
+        self._furniture = FurnitureDraw(wanted, env_config, hollow=True)
+        self._own = _own(env_config, rigid=True)
+        self._stored = wanted.stored
+        self._split: Split = env_config.split
+        self._taken, self._fillers = taken, fillers
+        # By folder and part: the object in question, and those that may lie beside it.
+        self._fitting: dict[tuple[str, str], tuple[Candidates, Candidates]] = {}
+
+    def __call__(self, rng: np.random.RandomState, spec: EpisodeSpec) -> SceneObjects:
+        for attempt in range(1, _PIECES + 1):
+            asset, part = self._furniture.draw(rng, spec)
+            subjects, others = self._candidates(asset, part)
+            try:
+                objects = [subjects.draw(rng, spec.object)]
+            except InputError:
+                if spec.furniture is not None or attempt == _PIECES:
+                    raise
+                continue
+            for _ in range(self._fillers):
+                names = [each.name for each in objects]
+                try:
+                    objects.append(others.draw(rng, without=names))
+                except InputError:  # scenes of one task have equally many objects
+                    objects.append(objects[0])
+            return SceneObjects((asset, *objects), part.name)
+        raise AssertionError
+
+    def strata(self) -> Strata:
+        """Pieces, each with its parts behind which something fits."""
+        groups = []
+        for group in self._furniture.strata():
+            fitting = [spec for spec in group if self._fits_something(spec)]
+            groups += [tuple(fitting)] if fitting else []
+        return tuple(groups)
+
+    def _fits_something(self, spec: EpisodeSpec) -> bool:
+        try:
+            self(np.random.RandomState(0), spec)
+        except InputError:
+            return False
+        return True
+
+    def _candidates(self, asset: Asset, part: MovingPart) -> tuple[Candidates, Candidates]:
+        key = str(asset.folder), part.name
+        if key not in self._fitting:
+            assert part.cavity is not None
+            pool = self._own or _shorter_than(
+                float(np.linalg.norm(part.cavity.extents)), self._split, self._stored
+            )
+            own_check = partial(_subject, part=part, taken=self._taken)
+            beside = partial(ways_into, part=part)
+            self._fitting[key] = Candidates(pool, own_check), Candidates(pool, beside)
+        return self._fitting[key]
+
+
+def with_cavity(wanted: Wanted, *, taken: bool, fillers: int) -> ObjectDrawFactory:
+    """A draw for tasks that store objects or take them out.
+
+    Args:
+      wanted: The furniture, its parts, and what is stored.
+      taken: Whether the object is taken out.
+      fillers: How many others there are.
+    """
+
+    def make(env_config: EnvConfig) -> CavityDraw:
+        return CavityDraw(wanted, env_config, taken=taken, fillers=fillers)
+
+    return make
+
+
+def _subject(asset: Asset, *, part: MovingPart, taken: bool) -> None:
+    require_graspable(asset)
+    (ways_out if taken else ways_into)(asset, part)
+
+
+def _shorter_than(
+    longest: float, split: Split, categories: Sequence[str] | None
+) -> list[Candidate]:
+    rows: Sequence[Category] = rigid_rows(longest)
+    if categories is not None:
+        rows = [CATALOGUE[name] for name in categories]
+    return builtin(split, rows)
+
+
+def _own(env_config: EnvConfig, *, rigid: bool) -> list[Candidate]:
+    """The user's rigid objects, or their furniture; empty where none of that kind is named."""
+    kind = "rigid" if rigid else "articulated"
+    return chosen(asset for asset in env_config.assets() or () if asset.kind == kind)
