@@ -51,8 +51,7 @@ def head(spec: TaskSpec) -> str:
                     f"{100 * tolerance['linear_speed']:g} cm/s and "
                     f"{tolerance['angular_speed']:g} rad/s",
                 ),
-                ("objects for training", ", ".join(fixed.train_objects)),
-                ("objects for testing", ", ".join(fixed.test_objects)),
+                (f"objects of protocol {frozen.version}", _objects(fixed)),
                 (
                     f"protocol {frozen.version}",
                     f"{len(fixed.seeds)} episodes, seeds {', '.join(map(str, _first(fixed, 3)))}, ...",
@@ -61,6 +60,13 @@ def head(spec: TaskSpec) -> str:
         ),
     ]
     return "\n\n".join(lines) + "\n"
+
+
+def _objects(fixed: FrozenTask) -> str:
+    """How many there are, of which categories."""
+    categories = sorted({catalogue.find(name)[0] for name in fixed.objects})
+    count = f"{len(fixed.objects)} of {len(categories)} categories"
+    return count if len(categories) > 6 else f"{count}: {', '.join(fixed.objects)}"
 
 
 def card(spec: TaskSpec, environment: composer.Environment) -> str:

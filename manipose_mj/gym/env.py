@@ -20,7 +20,7 @@ from manipose_mj.tasks.scene.state import SceneState
 
 Observation = dict[str, np.ndarray]
 _SEEDS = 2**32
-RESET_OPTIONS = ("object",)
+RESET_OPTIONS = ("object", "furniture", "part")
 
 
 class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
@@ -83,8 +83,8 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         Args:
           seed: Determines this episode and those that follow without a seed, bit for bit; the same as
             `suite.load`'s.
-          options: `"object"`, the name of the asset that the episode shall be about, one of the
-            environment's.
+          options: `"object"`, `"furniture"` and `"part"`: names of the rigid object, the piece of furniture and
+            its drawer or door that the episode shall be about.
 
         Raises:
           InputError: The seed is no 32-bit number, an option is unknown, or no object has that name.

@@ -76,6 +76,7 @@ class Snapshot:
       task: What the task remembers of this episode.
       random_state: Of the environment's one generator.
       ended: Whether the episode was over.
+      name: Of the task, `"domain/name"`.
       objects: Of the scene; None where all episodes have the same.
     """
 
@@ -88,6 +89,7 @@ class Snapshot:
     task: dict[str, Any]
     random_state: Any
     ended: bool
+    name: str
     objects: SceneObjects | None = None
 
 
@@ -110,6 +112,7 @@ def save(environment: composer.Environment) -> Snapshot:
         task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
         random_state=environment.random_state.get_state(),
         ended=environment._reset_next_step,
+        name=task.env_config.task,
         objects=getattr(environment, "scene_objects", None),
     )
 
@@ -123,9 +126,11 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     Raises:
       InputError: The environment has not been reset yet, or its model is another one.
     """
-    if snapshot.objects is not None and isinstance(environment, TaskEnvironment):
-        environment.use(snapshot.objects)
     task, model, data = _parts(environment)
+    same_task = snapshot.name == task.env_config.task
+    if same_task and snapshot.objects is not None and isinstance(environment, TaskEnvironment):
+        environment.use(snapshot.objects)
+        task, model, data = _parts(environment)
     expected = mujoco.mj_stateSize(model, _STATE)
     shapes = {name: getattr(model, name).shape for name in _MODEL_FIELDS}
     if len(snapshot.state) != expected or any(
@@ -133,7 +138,7 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     ):
         raise InputError(
             f"snapshot of {len(snapshot.state)} state values; this environment has {expected}: "
-            "restore it in one of the same task, options and objects"
+            f"restore it in one of {snapshot.name} with the same options"
         )
     for name, values in snapshot.model.items():
         getattr(model, name)[:] = values

@@ -43,8 +43,7 @@ class TargetPoseConfig(TaskConfig):
 class TargetPose(SingleObjectTask):
     """Pick the object up and set it down at the goal, which is drawn as three axes.
 
-    Start and goal are stable poses of the object, turned freely about the vertical. Objects that an
-    episode does not use wait high above the scene, weightless: a change of object needs no new model.
+    Start and goal are stable poses of the object, turned freely about the vertical.
     """
 
     def __init__(

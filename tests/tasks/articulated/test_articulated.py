@@ -116,7 +116,7 @@ def test_what_is_inside_lies_inside_at_rest_and_apart(part):
             assert state.objects[name].linear_speed < 0.01
         assert physics.data.contact.dist.min(initial=0.0) > -0.002
         assert not task.success_now
-    assert set(counts) == {0, 1, 2}
+    assert {0, 1} <= set(counts) <= {0, 1, 2}
 
 
 def test_fitting_is_by_stable_poses():
@@ -167,7 +167,9 @@ def test_taken_out_is_met_on_the_marked_area_with_the_drawer_shut():
 
 def test_what_a_task_cannot_use_is_refused_in_one_line():
     wide = catalogue.load("box", 0)
-    with pytest.raises(InputError, match="tasks that open or close take articulated ones") as caught:
+    with pytest.raises(
+        InputError, match="tasks that open or close take articulated ones"
+    ) as caught:
         _load("open_microwave", objects=[wide])
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="no bottom drawer"):

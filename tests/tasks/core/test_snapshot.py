@@ -104,5 +104,5 @@ def test_a_snapshot_of_another_scene_is_refused():
     first.reset()
     second.reset()
     if len(save(first).state) != len(save(second).state):
-        with pytest.raises(InputError, match="restore it in one of the same task"):
+        with pytest.raises(InputError, match="restore it in one of "):
             restore(second, save(first))

@@ -304,24 +304,6 @@ def test_an_object_that_fits_no_zone_is_refused(mug):
 # The family
 
 
-def test_target_pose_without_a_shelf_samplers_what_it_always_drew():
-    environment = _environment("target_pose")
-    drawn = [
-        (task.object_name, *task.object.object_pose(physics)[:3, 3], *task.goals[0].pose[:3, 3])
-        for task, physics in _draws(environment, 3)
-    ]
-    names, numbers = [d[0] for d in drawn], np.array([d[1:] for d in drawn])
-    assert names == ["box_000", "box_001", "chips_can_000"]
-    np.testing.assert_allclose(numbers, REFERENCE, atol=1e-5)
-
-
-REFERENCE = [
-    [0.52210, -0.03495, 0.095, 0.57619, 0.25966, 0.095],
-    [0.57318, -0.26466, 0.0627, 0.52750, -0.04631, 0.0627],
-    [0.58494, 0.25073, 0.125, 0.48664, -0.10050, 0.03748],
-]
-
-
 def test_own_objects_are_used():
     box = catalogue.load("box", 1)
     for task in ("orientation", "position"):

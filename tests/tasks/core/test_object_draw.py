@@ -1,0 +1,157 @@
+"""Objects are drawn anew for every episode, in one environment whose observations keep their names and shapes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manipose_mj import suite
+from manipose_mj.assets import catalogue
+from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, rigid_rows
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.registry import named_task
+from manipose_mj.tasks.core.scene_source import SceneSource
+from tests.few_objects import few, load
+
+TARGET_POSE = ("single_object", "target_pose")
+MUGS = ["mug_000", "mug_001"]
+
+
+def _anything(asset):
+    """Every object can be used."""
+
+
+def test_candidates_are_all_built_in_objects_of_the_split_and_no_other():
+    rigid = [row for row in CATALOGUE.values() if row.object_type != "articulated"]
+    for split, share in (("train", 0.8), ("test", 0.2)):
+        names = {each.name for each in builtin(split, rigid_rows())}
+        assert len(names) == pytest.approx(share * sum(row.instances for row in rigid), rel=0.06)
+        assert all(CATALOGUE[c].split(i) == split for c, i in map(catalogue.find, names))
+        assert {catalogue.find(name)[0] for name in names} == {row.name for row in rigid}
+
+
+def test_every_category_is_as_likely_as_any_other_whatever_its_size():
+    asset = catalogue.load("box", 0)
+
+    def loaded(name, category):
+        return lambda: replace(asset, name=name, category=category)
+
+    pool = [Candidate(f"mug_{i}", "mug", loaded(f"mug_{i}", "mug")) for i in range(30)]
+    pool.append(Candidate("pan_0", "pan", loaded("pan_0", "pan")))
+    candidates, rng = Candidates(pool, _anything), np.random.RandomState(0)
+    drawn = [candidates.draw(rng).category for _ in range(300)]
+    assert 120 < drawn.count("pan") < 180
+    assert candidates.draw(rng, "pan_0").name == "pan_0"
+
+
+def test_what_cannot_be_used_is_drawn_again_and_told_where_nothing_can():
+    def no_mugs(asset):
+        if asset.category == "mug":
+            raise InputError(f"{asset.name}: no mugs here")
+
+    assets = [catalogue.load_by_name(name) for name in (*MUGS, "box_000")]
+    pool = [Candidate(a.name, a.category, lambda a=a: a) for a in assets]
+    candidates = Candidates(pool, no_mugs)
+    rng = np.random.RandomState(1)
+    assert {candidates.draw(rng).name for _ in range(20)} == {"box_000"}
+    assert candidates.usable() == {"box": ("box_000",)}
+    with pytest.raises(InputError, match="mug_001: no mugs here"):
+        candidates.draw(rng, "mug_001")
+    with pytest.raises(InputError, match="unknown object 'mug_2'; did you mean"):
+        candidates.draw(rng, "mug_2")
+    with pytest.raises(InputError, match="no mugs here"):
+        Candidates(pool[:2], no_mugs).draw(rng)
+
+
+def test_instances_differ_from_episode_to_episode_and_observations_keep_their_shape():
+    environment = load(*TARGET_POSE, seed=0, obs_mode="state+pose+segmentation")
+    spec = environment.observation_spec()
+    names = set()
+    for _ in range(12):
+        observation = environment.reset().observation
+        names.add(environment.task.object_name)
+        assert environment.observation_spec() == spec
+        assert observation.keys() == spec.keys()
+        assert all(observation[name].shape == spec[name].shape for name in spec)
+    assert len(names) > 4
+
+
+@pytest.mark.parametrize(
+    "task",
+    ["articulated/open_cabinet_door", "articulated/store_top_drawer", "single_object/orientation"],
+)
+def test_a_seed_gives_the_same_objects_and_bits_whatever_was_played_before(task):
+    first, second = (load(*task.split("/"), seed=seed, obs_mode="state+pose") for seed in (0, 5))
+    for seed in (3, 1, 3):
+        second.reset(EpisodeSpec(seed))
+    for seed in (1, 2, 3):
+        one, other = (env.reset(EpisodeSpec(seed)).observation for env in (first, second))
+        assert first.scene_objects.key == second.scene_objects.key
+        assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_an_episode_is_about_the_object_furniture_and_part_asked_for():
+    environment = load("articulated", "store_top_drawer", seed=0, obs_mode="state")
+    asked = EpisodeSpec(4, object="mug_001", furniture="cabinet_003")
+    environment.reset(asked)
+    task = environment.task
+    assert task.object.asset.name == "mug_001" and task.furniture.asset.name == "cabinet_003"
+    for wrong in (replace(asked, furniture="cabinet_001"), replace(asked, part="door")):
+        with pytest.raises(InputError) as caught:
+            environment.reset(wrong)
+        assert "\n" not in str(caught.value)
+    environment.reset(asked)  # and nothing is lost
+
+
+def test_a_scene_is_swapped_in_half_a_second_and_kept():
+    environment = load(*TARGET_POSE, seed=0, obs_mode="state", objects=[*MUGS, "box_000"])
+    environment.reset(EpisodeSpec(0, object="box_000"))
+    task = environment.task
+    times = []
+    for name in MUGS:
+        start = time.process_time()
+        environment.reset(EpisodeSpec(0, object=name))
+        times.append(time.process_time() - start)
+    assert min(times) < 0.5
+    environment.reset(EpisodeSpec(0, object="box_000"))
+    assert environment.task is task
+
+
+def test_the_control_mode_stays_when_the_scene_changes():
+    environment = load(*TARGET_POSE, seed=0, objects=MUGS, control_mode="pd_ee_delta_pose")
+    for name in MUGS:
+        environment.reset(EpisodeSpec(0, object=name))
+        assert environment.action_spec().shape == (7,)
+        environment.step(np.zeros(7))
+
+
+@pytest.mark.parametrize("name", ["articulated/open_cabinet_door", "articulated/close_top_drawer"])
+def test_evaluations_take_every_piece_of_furniture_with_all_its_parts(name):
+    scenes = SceneSource(named_task(name), EnvConfig(name, objects=few(name)))
+    groups = scenes.strata()
+    assert [{spec.furniture for spec in group} for group in groups] == [
+        {"cabinet_000"},
+        {"cabinet_003"},
+    ]
+    for spec in (spec for group in groups for spec in group):
+        drawn = scenes.draw(np.random.RandomState(0), spec)
+        assert drawn.part == spec.part and drawn.assets[0].name == spec.furniture
+
+
+@pytest.mark.full
+def test_objects_of_every_category_can_be_played():
+    pool = builtin("test", rigid_rows())
+    firsts = {candidate.category: candidate.name for candidate in reversed(pool)}
+    environment = suite.load(*TARGET_POSE, seed=0, obs_mode="state", split="test")
+    refused = []
+    for name in firsts.values():
+        try:
+            environment.reset(EpisodeSpec(0, object=name))
+        except InputError:
+            refused.append(name)
+    assert len(refused) <= 2, refused
