@@ -38,6 +38,7 @@ def normalised_links(
     """
     groups: dict[str, list[PartMesh]] = {}
     joints: dict[str, UrdfJoint] = {}
+    lacking: list[str] = []
     for link in urdf.visuals:
         chain = urdf.chain(link)
         moving = [j for j in chain if j.kind in MOVES]
@@ -52,7 +53,10 @@ def normalised_links(
         top = moving[0].child if moving else urdf.root
         if moving:
             joints[top] = moving[0]
-        groups.setdefault(top, []).extend(_parts(folder, urdf, link, pose_of(chain)))
+        groups.setdefault(top, []).extend(_parts(folder, urdf, link, lacking))
+    if lacking:
+        more = f" and {len(lacking) - 1} more like it" if len(lacking) > 1 else ""
+        log.warning("%s%s; drawn in plain colours", lacking[0], more)
     compare_size(folder, _mesh_bounds(urdf, groups))
     base = ScanLink("base", tuple(groups.pop(urdf.root, ())))
     if not base.parts:
@@ -124,16 +128,16 @@ def moved(part: PartMesh, pose: Float[np.ndarray, "4 4"], scale: float = 1.0) ->
     return replace(part, surfaces=tuple(surfaces))
 
 
-def _parts(folder: Path, urdf: Urdf, link: str, pose: Float[np.ndarray, "4 4"]) -> list[PartMesh]:
+def _parts(folder: Path, urdf: Urdf, link: str, lacking: list[str]) -> list[PartMesh]:
     surfaces: dict[str, list[Surface]] = {}
-    visuals = urdf.visuals[link]
+    visuals, pose = urdf.visuals[link], pose_of(urdf.chain(link))
     for visual in visuals:
         path = folder / visual.file
         if not path.is_file():
             log.warning("%s: missing; link %r is built without it", path, link)
             continue
         key = visual.name or link
-        part = PartMesh(key, key, read_wavefront(path, folder / "images"))
+        part = PartMesh(key, key, read_wavefront(path, folder / "images", lacking))
         if not part.surfaces:
             log.warning("%s: has no faces; link %r is built without it", path, link)
             continue
