@@ -99,7 +99,7 @@ def build(
             BuildJob(
                 name=name,
                 folder=out / name,
-                where=str(found[name].path),
+                where=found[name].where,
                 build=build_item,
                 arguments=(source, found[name], overrides.get(name)),
                 limits=limits,

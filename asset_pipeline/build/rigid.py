@@ -17,6 +17,7 @@ from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.grasp_sampling.sampler import sample_grasps
 
+
 def finish_rigid(
     folder: Path,
     *,

@@ -36,9 +36,10 @@ def steadied(body: Body, label: PoseLabel) -> tuple[Body, tuple[StablePose, ...]
       InputError: The body has no volume or no pose in which it rests.
     """
     poses = _rest_poses(body, label)
-    if len(body.collision) > 1 or body.collision[0].kind != "mesh" or _still(body, poses):
+    hull, *others = body.collision
+    if others or hull.kind != "mesh" or _still(body, poses):
         return body, poses
-    corners = np.asarray(body.collision[0].surface().vertices)
+    corners = np.asarray(hull.surface().vertices)
     meshes = [reduced_hull(half, ConvexSettings().max_vertices) for half in halves(corners)]
     cut = replace(body, collision=tuple(Shape("mesh", mesh=mesh) for mesh in meshes))
     poses_of_cut = _rest_poses(cut, label)

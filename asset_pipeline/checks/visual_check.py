@@ -110,17 +110,15 @@ def _match(body: str, seen: Sequence[Shape], solid: Sequence[Shape]) -> VisualMa
 def _outer_points(shapes: Sequence[Shape], spacing: float) -> Float[np.ndarray, "n 3"]:
     """Points evenly on the shapes' surfaces, without those inside another shape."""
     meshes = [shape.surface() for shape in shapes]
-    samples = [
-        trimesh.sample.sample_surface(mesh, max(int(mesh.area / spacing**2), 1), seed=0)
-        for mesh in meshes
-    ]
-    points = np.concatenate([points for points, _ in samples])
-    owner = np.repeat(np.arange(len(meshes)), [len(points) for points, _ in samples])
-    normals = [
-        np.asarray(mesh.face_normals)[faces]
-        for mesh, (_, faces) in zip(meshes, samples, strict=True)
-    ]
-    outside = points + OFF_FACE * spacing * np.concatenate(normals)
+    points, owner, outside = [], [], []
+    for index, mesh in enumerate(meshes):
+        count = max(int(mesh.area / spacing**2), 1)
+        found = trimesh.sample.sample_surface(mesh, count, seed=0)
+        points.append(np.asarray(found[0]))
+        owner += [index] * len(found[0])
+        normals = np.asarray(mesh.face_normals)[np.asarray(found[1])]
+        outside.append(points[-1] + OFF_FACE * spacing * normals)
+    points, owner, outside = np.concatenate(points), np.array(owner), np.concatenate(outside)
     hidden = np.zeros(len(points), bool)
     for index, mesh in enumerate(meshes):
         planes = ConvexHull(np.asarray(mesh.vertices)).equations
@@ -132,7 +130,7 @@ def _within(
     equations: Float[np.ndarray, "f 4"], points: Float[np.ndarray, "n 3"]
 ) -> Bool[np.ndarray, " n"]:
     """Which points lie in the convex hull with these half spaces."""
-    return (points @ equations[:, :3].T + equations[:, 3] <= 0).all(axis=1)
+    return np.all(points @ equations[:, :3].T + equations[:, 3] <= 0, axis=1)
 
 
 def _joined(shapes: Sequence[Shape]) -> trimesh.Trimesh:

@@ -44,16 +44,14 @@ def _merged(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:
 def _representatives(
     vertices: Float[np.ndarray, "v 3"], cell: float
 ) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " v"]]:
-    """Of each occupied cell the vertex nearest to the mean of its vertices; and the cell of every vertex."""
+    """Of each occupied cell the vertex farthest from the middle, which keeps corners and rims; and every vertex's cell."""
     # Off by half a cell, so that walls at round coordinates do not lie on the border of two cells.
     keys = np.floor(vertices / cell + 0.5).astype(np.int64)
     _, owner = np.unique(keys, axis=0, return_inverse=True)
     owner = owner.reshape(-1)
-    counts = np.bincount(owner)
-    means = np.stack([np.bincount(owner, axis) / counts for axis in vertices.T], axis=1)
-    distance = np.linalg.norm(vertices - means[owner], axis=1)
-    order = np.lexsort((distance, owner))
-    first = np.searchsorted(owner[order], np.arange(len(counts)))
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    order = np.lexsort((-np.linalg.norm(vertices - middle, axis=1), owner))
+    first = np.searchsorted(owner[order], np.arange(owner.max() + 1))
     return order[first], owner
 
 

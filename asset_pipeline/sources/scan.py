@@ -44,6 +44,13 @@ class ScanItem:
     path: Path
     member: str = ""
 
+    @property
+    def where(self) -> str:
+        """What messages name: the object's own folder, or the archive that holds it."""
+        return str(
+            (self.path / self.member).parent if self.member and self.path.is_dir() else self.path
+        )
+
 
 @dataclass(frozen=True)
 class Scan:
