@@ -24,11 +24,19 @@ AXES = {
 }  # fmt: skip
 # How often meshes have which axis up: scanners and CAD write z, modelling programs y, and glTF demands y.
 USUAL_UP = {"z": 0.6, "y": 0.35, "x": 0.02, "-z": 0.01, "-y": 0.01, "-x": 0.01}
-GLTF_UP = {"y": 0.95, "z": 0.04, "x": 0.0025, "-z": 0.0025, "-y": 0.0025, "-x": 0.0025}
+STATED = (
+    20.0  # times likelier than usual is the axis that the file states, which programs get wrong
+)
 # Two sides of a body of revolution differ by this share, as a standard deviation.
 ROUND = 0.05
 NEAR_UP = np.cos(np.deg2rad(10.0))
 NEVER_RESTS = 0.01  # the least probability that counts: a damaged foot still is a foot
+
+
+def suits(longest: float, category: str) -> bool:
+    """Whether a thing of the category may have this longest side [m]."""
+    low, high = _sizes(category)
+    return low / SLACK <= longest <= high * SLACK
 
 
 def guess_unit(longest: float, category: str) -> str:
@@ -41,10 +49,10 @@ def guess_unit(longest: float, category: str) -> str:
     Raises:
       InputError: It suits in no unit.
     """
-    low, high = CATALOGUE[category].size if category in CATALOGUE else TABLETOP
+    low, high = _sizes(category)
     middle = np.sqrt(low * high)
     unit = min(GUESSED_UNITS, key=lambda u: abs(np.log(UNITS[u] * longest / middle)))
-    if low / SLACK <= UNITS[unit] * longest <= high * SLACK:
+    if suits(UNITS[unit] * longest, category):
         return unit
     sizes = ", ".join(f"{UNITS[u] * longest:.3g} m in {u}" for u in GUESSED_UNITS)
     what = category if category in CATALOGUE else "tabletop object"
@@ -54,23 +62,29 @@ def guess_unit(longest: float, category: str) -> str:
     )
 
 
-def guess_up(mesh: trimesh.Trimesh, object_type: ObjectType, *, gltf: bool = False) -> str:
+def guess_up(mesh: trimesh.Trimesh, object_type: ObjectType, stated: str | None = None) -> str:
     """The axis that is up, of six: by how usual it is, how likely the mesh rests so, and whether it is round about it.
 
     Args:
       mesh: In any unit.
       object_type: Axial objects are round about their up axis.
-      gltf: Whether the format says that y is up.
+      stated: The axis that the format or the file says is up.
     """
     rests = _rest_probabilities(mesh)
     extents = np.asarray(mesh.extents)
     scores = {}
-    for name, usual in (GLTF_UP if gltf else USUAL_UP).items():
+    for name, share in USUAL_UP.items():
+        usual = share * (STATED if name == stated else 1.0)
         across = extents[np.array(AXES[name]) == 0]
         uneven = float(np.log(across[0] / across[1])) if across.min() > 0 else np.inf
         roundness = np.exp(-0.5 * (uneven / ROUND) ** 2) + 1e-3 if object_type == "axial" else 1.0
         scores[name] = usual * roundness * max(rests[name], NEVER_RESTS)
     return max(scores, key=scores.__getitem__)
+
+
+def _sizes(category: str) -> tuple[float, float]:
+    """Of the longest side, from and to [m]."""
+    return CATALOGUE[category].size if category in CATALOGUE else TABLETOP
 
 
 def _rest_probabilities(mesh: trimesh.Trimesh) -> dict[str, float]:

@@ -19,8 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from asset_pipeline.sources.categories import Kind, kind_of, kind_of_product
-from asset_pipeline.sources.files.mesh_file import ANONYMOUS, MESHES, companions, read_mesh_file
-from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up
+from asset_pipeline.sources.files.mesh_file import (
+    ANONYMOUS,
+    MESHES,
+    MeshFile,
+    companions,
+    read_mesh_file,
+)
+from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up, suits
 from asset_pipeline.sources.scan import Scan, ScanItem, check_scan_mesh, sha256
 from manipose_mj.assets.asset import Provenance
 from manipose_mj.assets.categories import CATALOGUE
@@ -168,25 +174,26 @@ def opened(item: MeshItem) -> Iterator[Scan]:
     """
     options, file = item.options, item.file
     found = read_mesh_file(file)
-    kind = _kind(item)
-    mesh, unit = found.mesh, options.unit
-    check_finite = np.isfinite(np.asarray(mesh.vertices)).all()
-    longest = float(np.ptp(np.asarray(mesh.vertices), axis=0).max()) if check_finite else np.nan
-    if unit is None and found.unit is not None:
-        unit = f"{found.unit:g}"
-        log.warning("%s: unit not given; the file says %s m, so it measures %.3g m", file, unit, found.unit * longest)  # fmt: skip
-    elif unit is None:
-        try:
-            unit = guess_unit(longest, kind.category) if check_finite else "m"
-        except InputError as error:
-            raise InputError(f"{file}: {error}") from None
-        log.warning("%s: unit not given; guessed %s, so it measures %.3g m; say --unit", file, unit, UNITS[unit] * longest)  # fmt: skip
+    mesh, guesses = found.mesh, []
+    kind = kind_of(options.category or "")
+    if options.category is None:
+        kind = kind_of_product(item.name)
+        guesses.append(f"category {kind.category} by its name (--category)")
+    kind = Kind(kind.category, options.object_type or kind.object_type)
+    unit = options.unit
+    if unit is None:
+        unit, origin = _unit(found, kind.category, file)
+        size = metres(unit) * float(np.ptp(np.asarray(mesh.vertices), axis=0).max())
+        said = unit if unit in UNITS else f"of {unit} m"
+        guesses.append(f"unit {said} {origin}, so that it measures {size:.3g} m (--unit)")
     mesh.vertices = metres(unit) * np.asarray(mesh.vertices)
     check_scan_mesh(mesh, str(file), unit=metres(unit))
     up = options.up
     if up is None:
-        up = guess_up(mesh, kind.object_type, gltf=file.suffix.lower() in (".glb", ".gltf"))
-        log.warning("%s: up axis not given; guessed %s; say --up", file, up)
+        up = guess_up(mesh, kind.object_type, found.up)
+        guesses.append(f"{up} up (--up)")
+    if guesses:
+        log.warning("%s: not stated and taken to be: %s", file, "; ".join(guesses))
     with tempfile.TemporaryDirectory(prefix="manipose-scan-") as scratch:
         texture = None
         if found.image is not None:
@@ -207,16 +214,18 @@ def opened(item: MeshItem) -> Iterator[Scan]:
         )
 
 
-def _kind(item: MeshItem) -> Kind:
-    said = item.options
-    if said.category is not None:
-        kind = kind_of(said.category)
-    else:
-        kind = kind_of_product(item.name)
-        log.warning(
-            "%s: category not given; by its name a %s; say --category", item.file, kind.category
-        )
-    return Kind(kind.category, said.object_type or kind.object_type)
+def _unit(found: MeshFile, category: str, file: Path) -> tuple[str, str]:
+    """The unit that nobody gave, and where it is from."""
+    vertices = np.asarray(found.mesh.vertices)
+    if not np.isfinite(vertices).all():
+        return "m", "for want of finite coordinates"  # which is refused next
+    longest = float(np.ptp(vertices, axis=0).max())
+    if found.unit is not None and suits(found.unit * longest, category):
+        return f"{found.unit:g}", "as the file says"
+    try:
+        return guess_unit(longest, category), "by its size"
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
 
 
 def _name(file: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -42,12 +43,14 @@ class MeshFile:
       image: Colours it, or None. Several materials are packed into one.
       rgba: Of a surface without an image.
       unit: Length of the unit [m] that the format or the file states, or None.
+      up: The axis that they state, such as `"y"`, or None.
     """
 
     mesh: trimesh.Trimesh
     image: Image.Image | None
     rgba: tuple[float, float, float, float]
     unit: float | None
+    up: str | None
 
 
 def read_mesh_file(path: Path) -> MeshFile:
@@ -63,7 +66,7 @@ def read_mesh_file(path: Path) -> MeshFile:
         check_rows(path)
     try:
         loaded = trimesh.load(path, process=False)
-        unit = METRES.get(str(loaded.units).lower())
+        unit = _metres(str(loaded.units).lower())
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:  # each of trimesh's readers fails in its own way
         reason = (str(error).splitlines() or [type(error).__name__])[0]
@@ -77,7 +80,7 @@ def read_mesh_file(path: Path) -> MeshFile:
         bare.visual = TextureVisuals(uv=np.nan_to_num(np.asarray(uv, float)))
     else:
         bare.merge_vertices()  # STL has three of its own for every face
-    return MeshFile(bare, image, _colour(mesh), unit)
+    return MeshFile(bare, image, _colour(mesh), unit, _stated_up(path))
 
 
 def companions(path: Path) -> list[Path]:
@@ -102,12 +105,31 @@ def companions(path: Path) -> list[Path]:
     return sorted(found)
 
 
+def _metres(text: str) -> float | None:
+    """The length of what trimesh calls a unit, such as `"millimeters"` or `"0.01 * meters"`."""
+    factor, _, name = text.rpartition(" * ")
+    try:
+        return METRES[name] * float(factor or 1)
+    except (KeyError, ValueError):
+        return None
+
+
+def _stated_up(path: Path) -> str | None:
+    """glTF has y up, COLLADA says it in the file."""
+    if path.suffix.lower() in (".glb", ".gltf"):
+        return "y"
+    if path.suffix.lower() != ".dae":
+        return None
+    stated = re.search(rb"<up_axis>\s*([XYZ])_UP", path.read_bytes())
+    return stated.group(1).decode().lower() if stated else "y"
+
+
 def _image(mesh: trimesh.Trimesh, path: Path) -> Image.Image | None:
     material = getattr(mesh.visual, "material", None)
-    for name in ("image", "baseColorTexture"):
-        image = getattr(material, name, None)
-        if isinstance(image, Image.Image):
-            return image
+    found = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+    # To an OBJ without a material trimesh gives a plain one of 2 x 2 pixels.
+    if isinstance(found, Image.Image) and (path.suffix.lower() != ".obj" or max(found.size) > 2):
+        return found
     beside = _beside(path)
     if beside is None:
         return None
