@@ -12,12 +12,12 @@ from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-# Those that meshes without a word about it are in; feet and inches are for those who say so.
-GUESSED_UNITS = ("m", "cm", "mm", "in")
+# Those that meshes are in which say nothing, and the one that is next where none of them suits.
+GUESSED_UNITS, RARE_UNIT = ("m", "cm", "mm"), "in"
 # Longest side of what lies on tables [m].
 TABLETOP = (0.03, 0.5)
 # A guess may miss the range of the category's sizes by this factor.
-SLACK = 1.5
+SLACK = 2.0
 AXES = {
     "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
     "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
@@ -31,6 +31,10 @@ STATED = (
 ROUND = 0.05
 NEAR_UP = np.cos(np.deg2rad(10.0))
 NEVER_RESTS = 0.01  # the least probability that counts: a damaged foot still is a foot
+# How far the probability of resting so counts: an upright packet mostly falls over, and stands all the same.
+REST_POWER = 0.3
+# Who draws an object to stand puts the ground at 0: so many times likelier, to this share of the height.
+ON_GROUND, GROUND = 10.0, 0.02
 
 
 def suits(longest: float, category: str) -> bool:
@@ -52,9 +56,10 @@ def guess_unit(longest: float, category: str) -> str:
     low, high = _sizes(category)
     middle = np.sqrt(low * high)
     unit = min(GUESSED_UNITS, key=lambda u: abs(np.log(UNITS[u] * longest / middle)))
-    if suits(UNITS[unit] * longest, category):
-        return unit
-    sizes = ", ".join(f"{UNITS[u] * longest:.3g} m in {u}" for u in GUESSED_UNITS)
+    for found in (unit, RARE_UNIT):
+        if suits(UNITS[found] * longest, category):
+            return found
+    sizes = ", ".join(f"{UNITS[u] * longest:.3g} m in {u}" for u in (*GUESSED_UNITS, RARE_UNIT))
     what = category if category in CATALOGUE else "tabletop object"
     raise InputError(
         f"the longest side is {longest:.4g}: {sizes}; a {what} has {low:g} to {high:g} m; "
@@ -63,7 +68,8 @@ def guess_unit(longest: float, category: str) -> str:
 
 
 def guess_up(mesh: trimesh.Trimesh, object_type: ObjectType, stated: str | None = None) -> str:
-    """The axis that is up, of six: by how usual it is, how likely the mesh rests so, and whether it is round about it.
+    """The axis that is up, of six: how usual it is, whether the ground is at 0 along it, how likely the mesh rests so,
+    and whether it is round about it.
 
     Args:
       mesh: In any unit.
@@ -78,7 +84,10 @@ def guess_up(mesh: trimesh.Trimesh, object_type: ObjectType, stated: str | None 
         across = extents[np.array(AXES[name]) == 0]
         uneven = float(np.log(across[0] / across[1])) if across.min() > 0 else np.inf
         roundness = np.exp(-0.5 * (uneven / ROUND) ** 2) + 1e-3 if object_type == "axial" else 1.0
-        scores[name] = usual * roundness * max(rests[name], NEVER_RESTS)
+        heights = np.asarray(mesh.bounds) @ np.array(AXES[name])
+        grounded = abs(float(heights.min())) < GROUND * float(np.ptp(heights))
+        rest = max(rests[name], NEVER_RESTS) ** REST_POWER
+        scores[name] = usual * roundness * rest * (ON_GROUND if grounded else 1.0)
     return max(scores, key=scores.__getitem__)
 
 

@@ -61,6 +61,8 @@ class MeshOptions:
     licence: str | None = None
 
     def __post_init__(self) -> None:
+        if self.category is not None and not self.category.strip():
+            raise InputError("the category is empty; expected a word such as mug")
         if self.up is not None and self.up not in AXES:
             raise unknown_name("axis", self.up, AXES)
         if self.object_type is not None and self.object_type not in TYPES:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,14 @@ from PIL import Image
 
 from asset_pipeline.build.data_set import build
 from asset_pipeline.sources import meshes
-from asset_pipeline.sources.mesh_guesses import AXES, guess_unit, guess_up
+from asset_pipeline.sources.categories import kind_of_product
+from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up
 from asset_pipeline.sources.meshes import MeshOptions
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
+from tests.places import REAL_DATA
 
+SCANS = REAL_DATA / "gso_more.tar.xz"
 SIZE = np.array([0.06, 0.04, 0.12])
 SAID = MeshOptions(category="box", up="z", unit="mm", licence="CC0 1.0")
 
@@ -105,11 +110,30 @@ def test_what_is_not_said_is_guessed_in_one_warning(tmp_path, caplog):
 
 @pytest.mark.parametrize(
     ("longest", "category", "unit"),
-    [(0.1, "mug", "m"), (10, "mug", "cm"), (100, "mug", "mm"), (4.1, "mug", "in"),
+    [(0.1, "mug", "m"), (10, "mug", "cm"), (100, "mug", "mm"), (12, "hammer", "in"),
      (300, "hammer", "mm"), (0.3, "hammer", "m"), (150, "gadget", "mm"), (0.15, "gadget", "m")],
 )  # fmt: skip
 def test_the_unit_is_the_one_that_suits_the_category(longest, category, unit):
     assert guess_unit(longest, category) == unit
+
+
+@pytest.mark.full
+@pytest.mark.skipif(not SCANS.is_file(), reason=f"{SCANS} is not there")
+def test_guesses_are_right_for_nearly_all_real_scans(tmp_path):
+    with tarfile.open(SCANS) as archive:
+        archive.extractall(tmp_path, filter="data")
+    ups, units = [], []
+    for file in sorted(tmp_path.glob("**/model.obj")):
+        mesh = trimesh.load(file, force="mesh", process=False, skip_materials=True)
+        kind = kind_of_product(file.parent.name)
+        ups.append(guess_up(mesh, kind.object_type) == "z")
+        mesh.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], [0, 1, 0]))
+        ups.append(guess_up(mesh, kind.object_type) == "y")
+        for unit in ("m", "mm"):
+            longest = float(mesh.extents.max()) / UNITS[unit]
+            with contextlib.suppress(InputError):  # it asks: that is no wrong guess
+                units.append(guess_unit(longest, kind.category) == unit)
+    assert len(ups) > 200 and np.mean(ups) > 0.97 and np.mean(units) > 0.99
 
 
 def test_a_size_that_suits_in_no_unit_asks_for_the_unit(tmp_path):
@@ -126,6 +150,15 @@ def test_up_is_where_the_object_stands(axis, kind):
     cone = trimesh.creation.cone(0.05, 0.12)
     cone.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], AXES[axis]))
     assert guess_up(cone, kind) == axis
+
+
+@pytest.mark.parametrize("axis", ["z", "y"])
+def test_up_is_away_from_the_ground_at_zero(axis):
+    packet = trimesh.creation.box((0.08, 0.12, 0.2) if axis == "z" else (0.08, 0.2, 0.12))
+    packet.apply_translation(
+        0.1 * np.array(AXES[axis])
+    )  # lying flat is likelier, and 0 is its foot
+    assert guess_up(packet, "mirror") == axis
 
 
 def test_up_is_what_the_file_states_where_the_shape_does_not_tell():
