@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from asset_pipeline.build.drawn_handle import with_handle
 from asset_pipeline.build.emit import write_asset
 from asset_pipeline.build.link_shapes import HANDLE, link_shapes
 from asset_pipeline.build.link_visuals import link_visuals
@@ -61,8 +62,10 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
 
     A moving part makes no contact with the base, nor with a part whose bounding box is within 1 cm of
     its own while both are shut: drawn doors and carcasses overlap by millimetres. Both still collide with all else.
-    Knobs become hinges of one full turn, and buttons slides without a spring; none of them, nor a tray, has a handle.
+    A handle that is drawn as one part with its door becomes a part of its own. Knobs become hinges of one full
+    turn, and buttons slides without a spring; none of them, nor a tray, has a handle.
     """
+    scan = replace(scan, moving=tuple(_with_handle(link, scan.base) for link in scan.moving))
     links = (scan.base, *scan.moving)
     shapes = {link.name: link_shapes(link) for link in links}
     flat = {name: [s for group in own.values() for s in group] for name, own in shapes.items()}
@@ -174,6 +177,12 @@ def _outwards(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> Float[np.ndarra
         axis = int(np.ptp(panel, axis=0).argmin())
         sign = np.sign(panel.mean(axis=0)[axis] - base.mean(axis=0)[axis]) or -1.0
     return sign * np.eye(3)[axis]
+
+
+def _with_handle(link: ScanLink, base: ScanLink) -> ScanLink:
+    if link.role not in ("door", "drawer"):
+        return link
+    return with_handle(link, _outwards(link, _mesh_bounds(list(base.parts))))
 
 
 def _handle(link: ScanLink, outwards: Float[np.ndarray, "3"]) -> PoseLabel | None:
