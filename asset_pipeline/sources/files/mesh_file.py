@@ -65,7 +65,9 @@ def read_mesh_file(path: Path) -> MeshFile:
     elif path.suffix.lower() == ".ply":
         check_rows(path)
     try:
-        loaded = trimesh.load(path, process=False)
+        loaded = trimesh.load(
+            path, process=False
+        )  # opens what the file names in its own folder only
         unit = _metres(str(loaded.units).lower())
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:  # each of trimesh's readers fails in its own way

@@ -80,6 +80,19 @@ def test_an_image_that_no_material_names_is_found_beside_the_mesh(tmp_path, imag
     assert pixels == (16, 16) and set(scan.provenance.inputs) == {"tea.obj", image, meshes.SAID}
 
 
+@pytest.mark.parametrize("named", ["../private.png", "{folder}/private.png"])
+def test_an_image_outside_the_folder_is_not_opened(tmp_path, named):
+    _picture().save(tmp_path / "private.png")
+    (tmp_path / "in").mkdir()
+    _box(textured=True).export(tmp_path / "in" / "tea.obj")
+    library = tmp_path / "in" / "material.mtl"
+    image = named.format(folder=tmp_path)
+    library.write_text(library.read_text().replace("material_0.png", image))
+    (tmp_path / "in" / "material_0.png").unlink()
+    scan, pixels = _read(tmp_path / "in" / "tea.obj")
+    assert pixels is None and "private.png" not in str(scan.provenance.inputs)
+
+
 def test_several_materials_become_one_image_and_a_plain_colour_stays(tmp_path):
     green = trimesh.creation.box(SIZE)
     material = trimesh.visual.material.PBRMaterial(baseColorFactor=[0, 255, 0, 255])
