@@ -5,7 +5,7 @@
     results = build("ycb", Path("ycb"), Path("assets"), jobs=8)
 
 `data_set` builds what a source holds; `rigid` and `articulated` give one object what it lacks (stable poses and
-grasps; joints, handles and cavities) with `grasp_trial`, `link_shapes` and `link_visuals`; `emit` writes the folder;
+grasps; joints, handles and cavities) with `steady_body`, `grasp_trial`, `link_shapes` and `link_visuals`; `emit` writes the folder;
 `pool` runs many at once, each in a process of `workers/` with limits; `relabel` corrects labels afterwards.
 """
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from asset_pipeline.build.drawn_handle import with_handle
 from asset_pipeline.build.emit import write_asset
 from asset_pipeline.build.link_shapes import HANDLE, link_shapes
 from asset_pipeline.build.link_visuals import link_visuals
@@ -44,6 +45,7 @@ RESISTANCE: dict[LinkRole, JointResistance] = {
     "lid": JointResistance(0.25, 0.3),
     "knob": JointResistance(0.02, 0.005),
     "button": JointResistance(0.5, 2.0),
+    "tray": JointResistance(0.1, 0.1),
 }
 # A door that its weight would open or shut with more than this hangs on springs [N m] ...
 HEAVY = 0.2
@@ -60,8 +62,10 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
 
     A moving part makes no contact with the base, nor with a part whose bounding box is within 1 cm of
     its own while both are shut: drawn doors and carcasses overlap by millimetres. Both still collide with all else.
-    Knobs become hinges of one full turn, and buttons slides without a spring; neither has a handle.
+    A handle that is drawn as one part with its door becomes a part of its own. Knobs become hinges of one full
+    turn, and buttons slides without a spring; none of them, nor a tray, has a handle.
     """
+    scan = replace(scan, moving=tuple(_with_handle(link, scan.base) for link in scan.moving))
     links = (scan.base, *scan.moving)
     shapes = {link.name: link_shapes(link) for link in links}
     flat = {name: [s for group in own.values() for s in group] for name, own in shapes.items()}
@@ -85,7 +89,7 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
             )
             if joint is not None:
                 outwards = _outwards(link, boxes["base"])
-                handle = _handle(link.parts, outwards)
+                handle = _handle(link, outwards)
                 cavity = _cavity(link, flat, boxes, outwards)
                 parts.append(MovingPart(link.name, joint, handle, cavity))
         asset = Asset(
@@ -175,10 +179,16 @@ def _outwards(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> Float[np.ndarra
     return sign * np.eye(3)[axis]
 
 
-def _handle(parts: tuple[PartMesh, ...], outwards: Float[np.ndarray, "3"]) -> PoseLabel | None:
-    """The label of the largest handle."""
-    handles = [p.mesh for p in parts if p.name == HANDLE]
-    if not handles:
+def _with_handle(link: ScanLink, base: ScanLink) -> ScanLink:
+    if link.role not in ("door", "drawer"):
+        return link
+    return with_handle(link, _outwards(link, _mesh_bounds(list(base.parts))))
+
+
+def _handle(link: ScanLink, outwards: Float[np.ndarray, "3"]) -> PoseLabel | None:
+    """The label of the largest handle of what opens."""
+    handles = [p.mesh for p in link.parts if p.name == HANDLE]
+    if not handles or link.role not in ("door", "drawer", "lid"):
         return None
     return handle_label(max(handles, key=lambda m: float(np.ptp(m.bounds, axis=0).max())), outwards)
 

@@ -23,8 +23,9 @@ from asset_pipeline.geometry.repair import closed
 from asset_pipeline.labelling.overrides.applying import overridden
 from asset_pipeline.labelling.overrides.reading import LABELS_FILE, Override, read_overrides
 from asset_pipeline.labelling.scan_label import scan_label
-from asset_pipeline.sources import google_scanned_objects, omniobject3d, pace, ycb
+from asset_pipeline.sources import google_scanned_objects, meshes, omniobject3d, pace, ycb
 from asset_pipeline.sources.articulated_scan import ArticulatedScan
+from asset_pipeline.sources.meshes import MeshOptions
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from asset_pipeline.sources.scan import Scan, ScanItem, write_texture
 from manipose_mj.assets.asset import Asset
@@ -34,16 +35,18 @@ from manipose_mj.errors import InputError, unknown_name
 
 log = logging.getLogger(__name__)
 
+OWN = "meshes"
 # A source is a module with `items(path)`, `inputs(item)` and the context manager `opened(item)`.
 SOURCES: dict[str, ModuleType] = {
     "google_scanned_objects": google_scanned_objects,
+    OWN: meshes,
     "omniobject3d": omniobject3d,
     "pace": pace,
     "partnet_mobility": partnet_mobility,
     "ycb": ycb,
 }
 # To be raised with every change that alters what is built.
-GENERATOR_VERSION = 4
+GENERATOR_VERSION = 5
 # Of household objects whose mass nobody published: between foam (150) and filled bottles (1000).
 DENSITY = 400.0  # [kg/m^3]
 DEFAULT_LIMITS = Limits()
@@ -58,6 +61,7 @@ def build(
     only: Sequence[str] = (),
     limits: Limits = DEFAULT_LIMITS,
     labels: Path | None = None,
+    said: MeshOptions | None = None,
     progress: Callable[[BuildResult, int], None] | None = None,
 ) -> list[BuildResult]:
     """Build every object at `path` into `out/<name>`.
@@ -75,6 +79,7 @@ def build(
       limits: Of each object.
       labels: A person's labels, which override what is measured; see `labelling.overrides`. None:
         `labels.yaml` in `out`, where there is one.
+      said: What is known of own meshes, the source `"meshes"`; the others know it themselves.
       progress: Called with each result and the number of objects in all.
 
     Returns:
@@ -86,9 +91,15 @@ def build(
     """
     if source not in SOURCES:
         raise unknown_name("source", source, SOURCES)
+    if source == OWN:
+        said = said or MeshOptions()
+        for remark in said.remarks():
+            log.warning("%s: %s", path, remark)
+    elif said is not None:
+        raise InputError(f"{source} knows its objects; options are for the source {OWN!r} only")
     # Objects are built in processes with other working directories.
     path, out = Path(path).absolute(), Path(out).absolute()
-    found = {item.name: item for item in _items(source, path, limits)}
+    found = {item.name: item for item in _items(source, path, limits, said)}
     for name in only:
         if name not in found:
             raise unknown_name(f"object in {path}", name, found)
@@ -99,7 +110,7 @@ def build(
             BuildJob(
                 name=name,
                 folder=out / name,
-                where=str(found[name].path),
+                where=found[name].where,
                 build=build_item,
                 arguments=(source, found[name], overrides.get(name)),
                 limits=limits,
@@ -170,7 +181,7 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
         body = Body(
             name=scan.name,
             collision=parts,
-            visual=(Shape(kind="mesh", mesh=scan.mesh, texture=texture),),
+            visual=(Shape("mesh", mesh=scan.mesh, rgba=scan.rgba, texture=texture),),
             mass_properties=draft.mass_properties,
         )
         asset = finish_rigid(
@@ -245,10 +256,13 @@ def _overrides(labels: Path | None, out: Path, found: dict[str, ScanItem]) -> di
     return overrides
 
 
-def _items(source: str, path: Path, limits: Limits) -> list[ScanItem]:
+def _items(source: str, path: Path, limits: Limits, said: MeshOptions | None) -> list[ScanItem]:
     """What the source finds, looking into archives under the same limits."""
     with tempfile.TemporaryDirectory(prefix="manipose-list-") as scratch:
-        outcome = limited_call(SOURCES[source].items, path, limits=limits, scratch=Path(scratch))
+        arguments = (path,) if said is None else (path, said)
+        outcome = limited_call(
+            SOURCES[source].items, *arguments, limits=limits, scratch=Path(scratch)
+        )
     if isinstance(outcome.error, LimitError):
         raise InputError(f"{path}: cannot be listed ({outcome.error})")
     if outcome.error is not None:

@@ -9,11 +9,13 @@ import numpy as np
 import trimesh
 from trimesh.visual import TextureVisuals
 
+from asset_pipeline.geometry.vertex_clustering import coarser
 from asset_pipeline.sources.articulated_scan import PartMesh, Surface
 from asset_pipeline.sources.scan import write_texture
 from manipose_mj.assets.geometry import Shape
 
-MAX_FACES = 8000  # of one mesh; only untextured meshes are decimated
+MAX_FACES = 8000  # of one mesh; only untextured meshes are made coarser ...
+MAX_CELL = 0.004  # ... and no point of them moves much farther than this [m]
 
 
 def link_visuals(parts: Sequence[PartMesh], textures: Path) -> tuple[Shape, ...]:
@@ -36,7 +38,7 @@ def link_visuals(parts: Sequence[PartMesh], textures: Path) -> tuple[Shape, ...]
         if texture is not None:
             image = write_texture(texture, textures / f"{texture.stem}.png")
         elif len(mesh.faces) > MAX_FACES:
-            mesh = mesh.simplify_quadric_decimation(face_count=MAX_FACES)
+            mesh = coarser(mesh, MAX_FACES, MAX_CELL)
         shapes.append(Shape("mesh", mesh=mesh, rgba=surfaces[0].rgba, texture=image))
     return tuple(shapes)
 

@@ -33,7 +33,7 @@ class BuildJob:
     Attributes:
       name: The object.
       folder: Its asset folder, absolute.
-      where: What messages about it name: the file it comes from.
+      where: What messages about it name: the folder or archive it comes from.
       build: `build(*arguments, folder, target)` writes the asset folder `target` and returns True, or
         False where `folder` is up to date. Importable by name; runs in another process.
       arguments: Of `build`.
@@ -147,7 +147,7 @@ def _reason(job: BuildJob, error: BaseException) -> str:
 
 
 def _named(job: BuildJob, message: str) -> str:
-    """One line that names the file that the object comes from, and no passing folder."""
+    """One line that names the folder or archive that the object comes from, and no passing folder."""
     passing = (
         re.escape(f"{job.folder.parent}/{PREFIX}{job.folder.name}-") + r"\w+(/[\w-]+/unpacked)?"
     )

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.build.emit import write_asset
 from asset_pipeline.build.grasp_trial import with_trials
 from asset_pipeline.build.scratch_model import scratch_model
-from asset_pipeline.geometry.stable_poses import stable_poses, verified
+from asset_pipeline.build.steady_body import steadied
 from manipose_mj.assets.asset import Area, Asset, Provenance
 from manipose_mj.assets.geometry import Body
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.grasp_sampling.sampler import sample_grasps
-
-# Of round collision shapes: their rest heights are then right to 0.02 mm.
-SECTIONS = 96
 
 
 def finish_rigid(
@@ -54,12 +49,8 @@ def finish_rigid(
     Raises:
       InputError: The object has no volume or no pose in which it rests.
     """
-    touching = cast(
-        trimesh.Trimesh, trimesh.util.concatenate([s.surface(SECTIONS) for s in body.collision])
-    )
-    poses = stable_poses(touching, body.mass_properties.center_of_mass, label=label)
+    body, poses = steadied(body, label)
     with scratch_model(body) as model_path:
-        poses = verified(poses, model_path, label=label)
         grasps = with_trials(sample_grasps(body, poses), poses, model_path)
     asset = Asset(
         folder=Path(folder),

@@ -1,4 +1,4 @@
-"""Whether built assets load alone, come to rest, open, and hold what is put into them."""
+"""Whether built assets load alone, look as they touch, come to rest, open, and hold what is put into them."""
 
 from __future__ import annotations
 

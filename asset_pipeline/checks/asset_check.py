@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from joblib import Parallel, delayed
 
+from asset_pipeline.checks.visual_check import visual_failures
+from asset_pipeline.geometry.settling import SETTLE_TIME, dropped, speeds
 from asset_pipeline.geometry.stable_poses import tilt
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
-from manipose_mj.assets.physics import REST_ANGULAR_SPEED, REST_LINEAR_SPEED
 from manipose_mj.assets.rest_scene import rest_scene
 from manipose_mj.errors import InputError
-from manipose_mj.poses import pose_to_vector, quaternion_to_rotation
+from manipose_mj.poses import quaternion_to_rotation
 
 
 @dataclass(frozen=True)
 class CheckLimits:
-    """What an asset must satisfy; the speeds are those of a body at rest.
+    """What an asset must satisfy, beside coming to rest as `geometry.settling` says.
 
     Attributes:
-      drop: Height of the fall [m].
-      settle_time: In which it must come to rest [s].
-      rest_time: How long the speeds must stay below the limits to count as rest [s].
-      linear_speed: [m/s]. angular_speed: [rad/s].
       penetration: At rest [m].
       tilt: Between the pose it was dropped in and the one it rests in [rad].
       part_vertices: Of any collision mesh.
@@ -36,11 +33,6 @@ class CheckLimits:
       force: On a sliding part [N]. torque: On a hinged one [N m].
     """
 
-    drop: float = 0.03
-    settle_time: float = 4.0
-    rest_time: float = 0.2
-    linear_speed: float = REST_LINEAR_SPEED
-    angular_speed: float = REST_ANGULAR_SPEED
     penetration: float = 0.002
     tilt: float = np.deg2rad(10.0)
     part_vertices: int = 32
@@ -120,14 +112,15 @@ def check_asset(folder: Path) -> CheckResult:
     try:
         asset = read_asset(folder)
         model = rest_scene(asset.model_path, plane=asset.kind == "rigid")
+        unlike = visual_failures(folder)
     except InputError as error:
         return CheckResult(folder.name, (str(error),))
     except (ValueError, mujoco.FatalError) as error:  # MuJoCo's compiler
         line = " ".join(str(error).split())
         return CheckResult(folder.name, (f"{folder}: model.xml does not compile: {line}",))
-    if asset.kind == "articulated":
-        return _check_articulated(asset, model)
-    return _check_rigid(asset, model)
+    checked = _check_articulated if asset.kind == "articulated" else _check_rigid
+    result = checked(asset, model)
+    return replace(result, failures=(*result.failures, *unlike))
 
 
 def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
@@ -142,18 +135,15 @@ def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
     if failures:
         return CheckResult(asset.folder.name, tuple(failures), **counts)
     start = max(asset.stable_poses, key=lambda p: p.probability)
-    data = mujoco.MjData(model)
-    data.qpos[:] = pose_to_vector(start.pose)
-    data.qpos[2] += LIMITS.drop
-    settle_seconds = _settle(model, data)
+    data, settle_seconds = dropped(model, start)
     depth = float(max(-data.contact.dist.min(), 0.0)) if data.ncon else 0.0
     leaned = tilt(quaternion_to_rotation(data.qpos[3:7]), start.rotation, asset.label)
     if not np.isfinite(data.qpos).all() or data.qpos[2] < -1.0:
         failures.append("fell through the plane or became unstable")
     if not np.isfinite(settle_seconds):
-        linear, angular = _speeds(data)
+        linear, angular = speeds(data)
         failures.append(
-            f"not at rest after {LIMITS.settle_time:g} s ({linear:.3f} m/s, {angular:.2f} rad/s)"
+            f"not at rest after {SETTLE_TIME:g} s ({linear:.3f} m/s, {angular:.2f} rad/s)"
         )
     if depth > LIMITS.penetration:
         failures.append(f"sinks {1e3 * depth:.1f} mm into the plane")
@@ -162,26 +152,6 @@ def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
             f"rests {np.rad2deg(leaned):.0f} deg from the stable pose it was dropped in"
         )
     return CheckResult(asset.folder.name, tuple(failures), settle_seconds, depth, leaned, **counts)
-
-
-def _settle(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Step until rest; the time at which it began [s], NaN if it did not come."""
-    steps = round(LIMITS.settle_time / model.opt.timestep)
-    still_since = np.nan
-    for _ in range(steps):
-        mujoco.mj_step(model, data)
-        linear, angular = _speeds(data)
-        if linear > LIMITS.linear_speed or angular > LIMITS.angular_speed or not data.ncon:
-            still_since = np.nan
-        elif np.isnan(still_since):
-            still_since = data.time
-        elif data.time - still_since >= LIMITS.rest_time:
-            return float(still_since)
-    return float("nan")
-
-
-def _speeds(data: mujoco.MjData) -> tuple[float, float]:
-    return float(np.linalg.norm(data.qvel[:3])), float(np.linalg.norm(data.qvel[3:6]))
 
 
 def _check_articulated(asset: Asset, model: mujoco.MjModel) -> CheckResult:
@@ -212,7 +182,7 @@ def _pull(model: mujoco.MjModel, data: mujoco.MjData, joint: int, slides: bool) 
     """How far the joint gets under a steady pull, everything else shut [m or rad]."""
     mujoco.mj_resetData(model, data)
     data.qfrc_applied[model.jnt_dofadr[joint]] = LIMITS.force if slides else LIMITS.torque
-    while data.time < LIMITS.settle_time:
+    while data.time < SETTLE_TIME:
         mujoco.mj_step(model, data)
     return float(data.qpos[model.jnt_qposadr[joint]])
 

@@ -1,11 +1,11 @@
-"""`manipose assets build`: asset folders from the files of a data set, or of the built-in catalogue."""
+"""`manipose assets build`: asset folders from the files of a data set, from own meshes, or of the built-in catalogue."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -13,6 +13,9 @@ from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
 CATALOGUE = "catalogue"
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Type = Literal["axial", "mirror", "functional"]
+_MESHES = "(meshes only)"
 
 
 def build_assets(
@@ -26,6 +29,13 @@ def build_assets(
     limit_s: float = 300.0,
     dask: Annotated[str | None, arg(metavar="ADDRESS")] = None,
     labels: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    category: Annotated[str | None, arg(metavar="NAME", help_behavior_hint=_MESHES)] = None,
+    up: Annotated[Axis | None, arg(help_behavior_hint=_MESHES)] = None,
+    unit: Annotated[
+        str | None, arg(metavar="m|cm|mm|in|ft|NUMBER", help_behavior_hint=_MESHES)
+    ] = None,
+    licence: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint=_MESHES)] = None,
+    object_type: Annotated[Type | None, arg(name="type", help_behavior_hint=_MESHES)] = None,
 ) -> int:
     """Build assets from scans: labels, convex parts, mass, stable poses, grasps, MJCF.
 
@@ -33,8 +43,9 @@ def build_assets(
     2 if an object could not be built; the others are there.
 
     Args:
-      source: Kind of data set, such as ycb; or catalogue, the built-in objects, which need no PATH.
-      path: The data set's folder or archive, as published.
+      source: Kind of data set, such as ycb; or meshes, files of your own (OBJ, STL, PLY, GLB, DAE); or catalogue,
+        the built-in objects, which need no PATH.
+      path: The data set's folder or archive, as published; a mesh, or a folder of meshes.
       out: Folder for the assets, one folder each; without it, catalogue fills the cache that
         tasks read.
       jobs: Objects at the same time, one core each.
@@ -44,14 +55,26 @@ def build_assets(
         to see PATH and DIR.
       labels: A person's labels (YAML), which override what is measured; without it labels.yaml in
         DIR, where there is one.
+      category: What kind of object the meshes are, such as mug; without it by the file's name.
+      up: Axis that points up when the object stands; without it guessed.
+      unit: Of the mesh's coordinates, also as a number of metres; without it guessed.
+      licence: Under which the meshes may be used; without it the assets say that it is unknown.
+      object_type: Rule of the label; without it the category's.
     """
     one_thread_per_process()
-    from asset_pipeline.build.data_set import SOURCES, BuildResult, build
+    from asset_pipeline.build.data_set import OWN, SOURCES, BuildResult, build
     from asset_pipeline.build.workers.limited_call import Limits
     from asset_pipeline.catalogue.parallel_build import build_catalogue
+    from asset_pipeline.sources.meshes import MeshOptions
     from manipose_mj.console import output
     from manipose_mj.errors import unknown_name
 
+    said = MeshOptions(category, object_type, up, unit, licence)
+    if source != OWN and said != MeshOptions():
+        raise InputError(
+            "--category, --up, --unit, --licence and --type are for meshes; "
+            f"leave them out, {source} knows its objects"
+        )
     done: list[BuildResult] = []
     with _cluster(dask), output.Progress("assets") as progress:
 
@@ -76,7 +99,15 @@ def build_assets(
                 raise InputError(f"--limit-s is {limit_s:g}; expected seconds, more than 0")
             limits = Limits(seconds=limit_s)
             results = build(
-                source, path, out, jobs=jobs, only=only, limits=limits, labels=labels, progress=show
+                source,
+                path,
+                out,
+                jobs=jobs,
+                only=only,
+                limits=limits,
+                labels=labels,
+                said=said if source == OWN else None,
+                progress=show,
             )
     failed = [r for r in results if r.status == "failed"]
     for result in failed:

@@ -18,7 +18,7 @@ def check_assets(
     *,
     jobs: int = CORES,
 ) -> int:
-    """Load every asset alone, let it fall and rest, open what opens, and report.
+    """Load every asset alone, compare what is seen with what touches, let it fall and rest, open what opens, and report.
 
     Exits with 1 if an asset misbehaves, with 2 if one cannot be read at all.
 

@@ -35,21 +35,21 @@ def hull_parts(
     strays = float((corners @ planes[:, :3].T + planes[:, 3]).max())
     if strays <= tolerance or max_parts < 2:
         return [part]
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    axis = int(np.argmax(high - low))
-    middle = float((low + high)[axis] / 2)
-    whole = manifold3d.Manifold.hull_points(np.ascontiguousarray(corners))
-    halves = whole.split_by_plane(tuple(np.eye(3)[axis]), middle)
     return [
         part
-        for half in halves
-        for part in hull_parts(
-            np.asarray(half.to_mesh64().vert_properties)[:, :3],
-            max_vertices,
-            tolerance=tolerance,
-            max_parts=max_parts // 2,
-        )
+        for half in halves(corners)
+        for part in hull_parts(half, max_vertices, tolerance=tolerance, max_parts=max_parts // 2)
     ]
+
+
+def halves(points: Float[np.ndarray, "n 3"]) -> list[Float[np.ndarray, "m 3"]]:
+    """The corners of either half of the points' hull, cut across the middle of its longest side."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    axis = int(np.argmax(high - low))
+    middle = float((low + high)[axis] / 2)
+    whole = manifold3d.Manifold.hull_points(np.ascontiguousarray(points))
+    cut = whole.split_by_plane(tuple(np.eye(3)[axis]), middle)
+    return [np.asarray(half.to_mesh64().vert_properties)[:, :3] for half in cut]
 
 
 def reduced_hull(points: Float[np.ndarray, "n 3"], max_vertices: int) -> trimesh.Trimesh:

@@ -12,8 +12,8 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Provenance
 
-# What a moving link is for: a knob turns and a button gives way, and neither opens anything.
-LinkRole = Literal["door", "drawer", "lid", "knob", "button"]
+# What a moving link is for: a knob turns, a button gives way, a tray turns or slides inside; none of them opens anything.
+LinkRole = Literal["door", "drawer", "lid", "knob", "button", "tray"]
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ def hashes(item: ScanItem, members: Collection[PurePosixPath]) -> dict[str, str]
     else:
         found = archives.hashes(item.path, [str(m) for m in members])
     if item.member not in found:
-        raise InputError(f"{item.path}: no such file: {item.member}; expected {item.name} there")
+        raise InputError(f"{item.where}: no such file: {item.member}; expected {item.name} there")
     names = Counter(PurePosixPath(m).name for m in found)
     keys = {m: n if names[n := PurePosixPath(m).name] == 1 else m for m in sorted(found)}
     return {key: found[m] for m, key in keys.items()}

@@ -44,6 +44,13 @@ class ScanItem:
     path: Path
     member: str = ""
 
+    @property
+    def where(self) -> str:
+        """What messages name: the object's own folder, or the archive that holds it."""
+        return str(
+            (self.path / self.member).parent if self.member and self.path.is_dir() else self.path
+        )
+
 
 @dataclass(frozen=True)
 class Scan:
@@ -61,6 +68,7 @@ class Scan:
       fill: `"solid"`: the mass fills what the mesh encloses; `"shell"`: it lies in the surface
         (blow-moulded and hollow things whose inside the scanner could not see).
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame; tools only.
+      rgba: Colour of what has no texture.
     """
 
     name: str
@@ -73,6 +81,7 @@ class Scan:
     provenance: Provenance
     fill: Literal["solid", "shell"] = "solid"
     functional: Float[np.ndarray, "3"] | None = None
+    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
 
 
 def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
@@ -97,18 +106,32 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
         raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
     assert isinstance(mesh, trimesh.Trimesh)
     mesh.vertices = np.asarray(mesh.vertices) * unit
-    check_mesh(mesh, str(path), unit=unit)
+    check_scan_mesh(mesh, str(path), unit=unit)
+    return mesh
+
+
+def check_scan_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
+    """Refuse a mesh that cannot be an object on a table; turn faces that point inwards, and say what looks damaged.
+
+    Args:
+      mesh: In metres; changed in place.
+      where: Opens the messages.
+      unit: Length of the unit it was given in [m].
+
+    Raises:
+      InputError: As `check_mesh`.
+    """
+    check_mesh(mesh, where, unit=unit)
     if flaps := drop_flaps(mesh):
-        log.warning("%s: %d faces hung on the surface by one edge only; left out", path, flaps)
+        log.warning("%s: %d faces hung on the surface by one edge only; left out", where, flaps)
     if turned := turn_outwards(mesh):
-        log.warning("%s: %d of %d faces pointed inwards; turned", path, turned, len(mesh.faces))
+        log.warning("%s: %d of %d faces pointed inwards; turned", where, turned, len(mesh.faces))
     for defect in _defects(mesh):
-        log.warning("%s: %s; is the file damaged?", path, defect)
+        log.warning("%s: %s; is the file damaged?", where, defect)
     if holes := open_edges(mesh):
         log.warning(
-            "%s: the surface has holes (%d open edges), filled for contacts and mass", path, holes
+            "%s: the surface has holes (%d open edges), filled for contacts and mass", where, holes
         )
-    return mesh
 
 
 def _defects(mesh: trimesh.Trimesh) -> list[str]:

@@ -195,6 +195,9 @@ def _scan(item: ScanItem, folder: Path, member: Path) -> Scan:
     texture = (folder / member).with_name(TEXTURE)
     # Its only use: what it says must be what is taken anyway.
     library = read_materials(texture.with_name(LIBRARY), texture.parent)
+    for material in library.values():
+        if material.lacks:
+            log.warning("%s: %s", texture.with_name(LIBRARY), material.lacks)
     if texture.is_file() and not any(m.texture == texture for m in library.values()):
         log.warning("%s: no material of %s has it; taken all the same", texture, LIBRARY)
     entry = OBJECTS.get(item.name) or _unlisted(item.name)

@@ -1,4 +1,4 @@
-"""What is seen of a built asset, read back from its `model.xml`: the inverse of what `emit` writes."""
+"""What is seen of a built asset, and what touches, read back from its `model.xml`: the inverse of what `emit` writes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import trimesh
 
 from manipose_mj.assets.asset import MODEL_FILE
 from manipose_mj.assets.geometry import Shape
-from manipose_mj.assets.physics import VISUAL_GROUP
+from manipose_mj.assets.physics import COLLISION_GROUP, VISUAL_GROUP
 from manipose_mj.errors import InputError
 from manipose_mj.poses import vector_to_pose
 
@@ -22,6 +22,19 @@ def visible_shapes(folder: Path) -> dict[str, tuple[Shape, ...]]:
     Raises:
       InputError: The model or a mesh it names cannot be read.
     """
+    return _shapes(folder, VISUAL_GROUP)
+
+
+def collision_shapes(folder: Path) -> dict[str, tuple[Shape, ...]]:
+    """The collision shapes of every body by its name, in the object frame with all joints at zero.
+
+    Raises:
+      InputError: The model or a mesh it names cannot be read.
+    """
+    return _shapes(folder, COLLISION_GROUP)
+
+
+def _shapes(folder: Path, group: int) -> dict[str, tuple[Shape, ...]]:
     path = folder / MODEL_FILE
     try:
         root = ElementTree.parse(path).getroot()
@@ -37,7 +50,7 @@ def visible_shapes(folder: Path) -> dict[str, tuple[Shape, ...]]:
             body.attrib["name"]: tuple(
                 _shape(geom, meshes, materials)
                 for geom in body.findall("geom")
-                if geom.get("group") == str(VISUAL_GROUP)
+                if geom.get("group") == str(group)
             )
             for body in root.iter("body")
         }

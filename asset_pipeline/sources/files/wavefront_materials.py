@@ -27,14 +27,17 @@ KEYWORDS = frozenset({
 
 @dataclass(frozen=True)
 class Material:
-    """Attributes: rgba; texture, the image that colours it, or None."""
+    """Attributes: rgba; texture, the image that colours it, or None; lacks, what is said to colour it and is not there."""
 
     rgba: tuple[float, float, float, float] = GREY
     texture: Path | None = None
+    lacks: str = ""
 
 
 def read_materials(path: Path, images: Path) -> dict[str, Material]:
     """Diffuse colour, opacity and texture by name; what cannot be read stays grey, with a warning.
+
+    Images that are not there are no warning: each material says what it lacks.
 
     Args:
       path: The library, at most one folder below the object's.
@@ -48,6 +51,7 @@ def read_materials(path: Path, images: Path) -> dict[str, Material]:
     colour: dict[str, list[float]] = {}
     opacity: dict[str, float] = {}
     texture: dict[str, Path] = {}
+    lacks: dict[str, str] = {}
     defects: list[str] = []
     name = None
     for number, line in enumerate(text.split("\n"), start=1):
@@ -70,6 +74,8 @@ def read_materials(path: Path, images: Path) -> dict[str, Material]:
             elif keyword == "map_Kd" and name is not None:
                 if image := _image(rest.strip(), images, defects):
                     texture[name] = image
+                else:
+                    lacks[name] = f"texture {rest.strip()!r} is not in {images.name}"
             elif keyword.startswith("map_") and not re.fullmatch(r"map_[A-Za-z]+", keyword):
                 raise ValueError(f"{keyword[:20]!r} is no keyword of MTL")
         except ValueError as error:
@@ -79,7 +85,7 @@ def read_materials(path: Path, images: Path) -> dict[str, Material]:
     if defects:
         log.warning("%s: %s", path, "; ".join(defects))
     return {
-        n: Material((c[0], c[1], c[2], opacity.get(n, 1.0)), texture.get(n))
+        n: Material((c[0], c[1], c[2], opacity.get(n, 1.0)), texture.get(n), lacks.get(n, ""))
         for n, c in colour.items()
     }
 
@@ -90,7 +96,4 @@ def _image(name: str, images: Path, defects: list[str]) -> Path | None:
     if leaves(name, depth=1):
         defects.append(f"it names {name!r}, outside the object's folder, which is not opened")
     image = images / last if last.isprintable() and last not in ("", ".", "..") else None
-    if image is not None and image.is_file():
-        return image
-    defects.append(f"texture {name!r} is not in {images.name}")
-    return None
+    return image if image is not None and image.is_file() else None

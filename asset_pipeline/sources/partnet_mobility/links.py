@@ -14,6 +14,8 @@ from jaxtyping import Float
 
 from asset_pipeline.sources.articulated_scan import LinkJoint, LinkRole, PartMesh, ScanLink, Surface
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_size, pose_of
+from asset_pipeline.sources.partnet_mobility.roles import named_role, shaped_role
+from asset_pipeline.sources.partnet_mobility.sizes import CategorySize, likely_scale
 from asset_pipeline.sources.partnet_mobility.urdf import Urdf, UrdfJoint
 from asset_pipeline.sources.partnet_mobility.wavefront import read_wavefront
 from manipose_mj.errors import InputError
@@ -25,7 +27,7 @@ FULL_TURN = 2 * np.pi
 MOVES = ("revolute", "prismatic", "continuous")
 MIN_TRAVEL = {"slide": 5e-4, "hinge": np.deg2rad(1.0)}  # [m, rad]; less is as good as fixed
 MAX_SIZE = 4.0  # [m]
-Side = Literal["depth", "width", "height"]
+DOOR_TRAVEL = np.pi / 2  # of a door whose limits nobody stated
 
 
 def normalised_links(
@@ -38,6 +40,7 @@ def normalised_links(
     """
     groups: dict[str, list[PartMesh]] = {}
     joints: dict[str, UrdfJoint] = {}
+    lacking: list[str] = []
     for link in urdf.visuals:
         chain = urdf.chain(link)
         moving = [j for j in chain if j.kind in MOVES]
@@ -52,7 +55,10 @@ def normalised_links(
         top = moving[0].child if moving else urdf.root
         if moving:
             joints[top] = moving[0]
-        groups.setdefault(top, []).extend(_parts(folder, urdf, link, pose_of(chain)))
+        groups.setdefault(top, []).extend(_parts(folder, urdf, link, lacking))
+    if lacking:
+        more = f" and {len(lacking) - 1} more like it" if len(lacking) > 1 else ""
+        log.warning("%s%s; drawn in plain colours", lacking[0], more)
     compare_size(folder, _mesh_bounds(urdf, groups))
     base = ScanLink("base", tuple(groups.pop(urdf.root, ())))
     if not base.parts:
@@ -64,15 +70,15 @@ def normalised_links(
         if not parts:
             log.warning("%s: link %r has no mesh; left out", folder, name)
             continue
-        kind, role = joints[name].kind, _role(joints[name], semantics.get(name), parts)
-        log.debug("%s: %s is a %s %s", folder, name, kind, role)
         frame = pose_of(urdf.chain(joints[name].parent)) @ joints[name].pose
+        role = _role(joints[name], semantics.get(name), parts, frame)
+        log.debug("%s: %s is a %s %s", folder, name, joints[name].kind, role)
         found.append(_shut(ScanLink(name, tuple(parts), None, role), joints[name], frame, base))
     return base, found
 
 
 def placed_links(
-    links: tuple[ScanLink, list[ScanLink]], side: Side, length: float
+    links: tuple[ScanLink, list[ScanLink]], size: CategorySize
 ) -> tuple[ScanLink, list[ScanLink]]:
     """The links in metres, the middle of the base above the origin, nothing ever below z = 0.
 
@@ -81,8 +87,10 @@ def placed_links(
 
     Args:
       links: Base and moving links, z up and the front towards -x.
-      side: Of the bounding box, handles left out, that is known.
-      length: Of that side [m].
+      size: How large such things are, handles left out.
+
+    Raises:
+      InputError: The object is flat, or would be gigantic.
     """
     base, moving = links
     bodies = [p.mesh for link in (base, *moving) for p in link.parts if p.name != "handle"]
@@ -91,13 +99,13 @@ def placed_links(
     extents = high - low
     if not (np.isfinite(extents).all() and extents.min() > 1e-6):
         raise InputError(f"the object measures {extents}; expected a solid thing")
-    scale = length / float(extents[("depth", "width", "height").index(side)])
+    scale = likely_scale(extents, size.builds)
     everything = np.array([p.mesh.bounds for link in (base, *moving) for p in link.parts])
-    size = scale * (everything[:, 1].max(axis=0) - everything[:, 0].min(axis=0))
-    if size.max() > MAX_SIZE:
+    whole = scale * (everything[:, 1].max(axis=0) - everything[:, 0].min(axis=0))
+    if whole.max() > MAX_SIZE:
         raise InputError(
-            f"the object would measure {' x '.join(f'{e:.3g}' for e in size)} m with a {side} of "
-            f"{length:g} m; expected a piece of furniture below {MAX_SIZE:g} m"
+            f"the object would measure {' x '.join(f'{e:.3g}' for e in whole)} m, as large as such a "
+            f"{size.category} is; expected a piece of furniture below {MAX_SIZE:g} m"
         )
     lowest = min([low[2], *(_lowest(link) for link in moving)])
     foot = np.array([*_bounds(base)[:, :2].mean(axis=0), lowest])
@@ -124,16 +132,16 @@ def moved(part: PartMesh, pose: Float[np.ndarray, "4 4"], scale: float = 1.0) ->
     return replace(part, surfaces=tuple(surfaces))
 
 
-def _parts(folder: Path, urdf: Urdf, link: str, pose: Float[np.ndarray, "4 4"]) -> list[PartMesh]:
+def _parts(folder: Path, urdf: Urdf, link: str, lacking: list[str]) -> list[PartMesh]:
     surfaces: dict[str, list[Surface]] = {}
-    visuals = urdf.visuals[link]
+    visuals, pose = urdf.visuals[link], pose_of(urdf.chain(link))
     for visual in visuals:
         path = folder / visual.file
         if not path.is_file():
             log.warning("%s: missing; link %r is built without it", path, link)
             continue
         key = visual.name or link
-        part = PartMesh(key, key, read_wavefront(path, folder / "images"))
+        part = PartMesh(key, key, read_wavefront(path, folder / "images", lacking))
         if not part.surfaces:
             log.warning("%s: has no faces; link %r is built without it", path, link)
             continue
@@ -154,16 +162,20 @@ def _mesh_bounds(urdf: Urdf, groups: dict[str, list[PartMesh]]) -> Float[np.ndar
                      np.max([p.max(axis=0) for p in points], axis=0)])  # fmt: skip
 
 
-def _role(joint: UrdfJoint, semantics: Semantics | None, parts: list[PartMesh]) -> LinkRole:
-    words = " ".join([semantics.name if semantics else "", *(p.name for p in parts)]).lower()
+def _role(
+    joint: UrdfJoint,
+    semantics: Semantics | None,
+    parts: list[PartMesh],
+    frame: Float[np.ndarray, "4 4"],
+) -> LinkRole:
+    slides = joint.kind == "prismatic"
+    named = named_role(slides, semantics.name if semantics else "", [p.name for p in parts])
+    if named is not None:
+        return named
     if joint.kind == "continuous":
-        return "knob"
-    small = any(word in words for word in ("button", "knob", "switch")) and "door" not in words
-    if joint.kind == "prismatic":
-        return "button" if small else "drawer"
-    if small:
-        return "knob"
-    return "lid" if "lid" in words.split() else "door"
+        bounds = _bounds(ScanLink("", tuple(parts)))
+        return shaped_role(bounds, frame[:3, 3], frame[:3, :3] @ joint.axis)
+    return "drawer" if slides else "door"
 
 
 def _shut(
@@ -172,21 +184,24 @@ def _shut(
     """The link at the limit that is shut, its axis turned so that positive opens.
 
     Of a door's or a drawer's two limits, the one where link and base share the smaller bounding box is
-    shut; of the others, and where the boxes are alike, the lower one.
+    shut; of the others, and where the boxes are alike, the lower one. A door without limits is shut as drawn and
+    opens by a quarter turn, the way that takes it farther out of the base.
     """
     kind: Literal["slide", "hinge"] = "slide" if joint.kind == "prismatic" else "hinge"
     origin, axis = frame[:3, 3], frame[:3, :3] @ joint.axis
+
+    def box(value: float) -> float:
+        """The volume of the box around the base and the link there."""
+        both = np.stack([_bounds(base), _bounds(_turned(link, kind, origin, axis, value))])
+        return float(np.prod(both[:, 1].max(axis=0) - both[:, 0].min(axis=0)))
+
     lower, upper = joint.limits or (0.0, FULL_TURN)
     start, sign = lower, 1.0
-    if link.role in ("door", "drawer", "lid"):
-        corners = _bounds(base)
-        boxes = []
-        for value in (lower, upper):
-            bounds = _bounds(_turned(link, kind, origin, axis, value))
-            both = np.stack([corners, bounds])
-            boxes.append(float(np.prod(both[:, 1].max(axis=0) - both[:, 0].min(axis=0))))
-        if boxes[1] < 0.999 * boxes[0]:
-            start, sign = upper, -1.0
+    if link.role in ("door", "lid") and joint.limits is None:
+        upper = DOOR_TRAVEL
+        sign = 1.0 if box(upper) >= box(-upper) else -1.0
+    elif link.role in ("door", "drawer", "lid") and box(upper) < 0.999 * box(lower):
+        start, sign = upper, -1.0
     joint_of = LinkJoint(kind, origin, sign * axis, upper - lower)
     return replace(_turned(link, kind, origin, axis, start), joint=joint_of)
 

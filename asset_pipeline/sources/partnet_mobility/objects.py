@@ -1,7 +1,7 @@
 """PartNet-Mobility as published: folders `<id>/` with `mobility.urdf`, its part meshes and semantics.
 
 Meshes have no unit and y up; the URDF's base joint turns them z up with the front towards -x. An object
-becomes metric by one length of its category (`SIZES`). Doors, drawers, knobs and buttons come out shut;
+becomes metric by the lengths of its category (`sizes.SIZES`). Doors, drawers, knobs and buttons come out shut;
 a link that hangs on another moving link is taken as fixed to it, and one that floats as fixed where it
 is, each with a warning. https://sapien.ucsd.edu, non-commercial research, no redistribution.
 """
@@ -13,14 +13,15 @@ import logging
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any
 
 from asset_pipeline.sources import collection
 from asset_pipeline.sources.articulated_scan import ArticulatedScan, ScanLink
 from asset_pipeline.sources.partnet_mobility.links import normalised_links, placed_links
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_links
+from asset_pipeline.sources.partnet_mobility.sizes import BODIES, SIZES, CategorySize
 from asset_pipeline.sources.partnet_mobility.urdf import read_urdf
 from asset_pipeline.sources.scan import ScanItem
 from manipose_mj.assets.asset import Provenance
@@ -32,49 +33,6 @@ SOURCE = "PartNet-Mobility v2"
 LICENCE = "PartNet-Mobility terms of use: non-commercial research, no redistribution"
 URDF = "mobility.urdf"
 FILES = (URDF, "mobility_v2.json", "semantics.txt", "meta.json", "bounding_box.json")
-
-
-@dataclass(frozen=True)
-class CategorySize:
-    """How large things of a category are.
-
-    Attributes:
-      category: Our name of it.
-      side: Which side of the bounding box, everything shut and handles left out, is known.
-      length: Of that side [m].
-      appliance: Whether the walls are sheet metal around foam and air; else they are board.
-    """
-
-    category: str
-    side: Literal["depth", "width", "height"]
-    length: float
-    appliance: bool = False
-
-
-# One length each: the one that varies least among things on sale.
-# StorageFurniture: heights and widths vary fivefold, depths do not: IKEA's BESTA cabinets with doors
-# are 42 cm deep, most sideboards and bookcases with doors 35 to 45 cm. Table: EN 527-1 has fixed desk
-# tops at 740 mm. Microwave: counter-top ones are 19 in wide and 10.5 in high (appliance size guides).
-# Oven: free-standing ranges are 30 in wide and 36 in high. Dishwasher, Refrigerator, WashingMachine:
-# the module of kitchens, 24 in or 600 mm (EN 1116), is their width; the fridge is then one that fits
-# under a counter.
-SIZES: dict[str, CategorySize] = {
-    "StorageFurniture": CategorySize("cabinet", "depth", 0.42),
-    "Table": CategorySize("table", "height", 0.74),
-    "Microwave": CategorySize("microwave", "width", 0.48, appliance=True),
-    "Oven": CategorySize("oven", "width", 0.76, appliance=True),
-    "Dishwasher": CategorySize("dishwasher", "width", 0.60, appliance=True),
-    "Refrigerator": CategorySize("refrigerator", "width", 0.60, appliance=True),
-    "WashingMachine": CategorySize("washing_machine", "width", 0.60, appliance=True),
-}
-# What the heavy link is called where `meta.json` does not say the category.
-BODIES = {
-    "microwave_body": "Microwave",
-    "oven_body": "Oven",
-    "dishwasher_body": "Dishwasher",
-    "refrigerator_body": "Refrigerator",
-    "furniture_body": "StorageFurniture",
-}
 
 
 def items(path: Path) -> list[ScanItem]:
@@ -110,8 +68,9 @@ def opened(item: ScanItem) -> Iterator[ArticulatedScan]:
         except InputError as error:
             # The folder of an unpacked archive is gone by the time anyone reads the message.
             message = str(error).replace(str(folder), str(item.path))
-            named = str(item.path) in message
-            raise InputError(message if named else f"{item.path}: {message}") from None
+            raise InputError(
+                message if item.where in message else f"{item.where}: {message}"
+            ) from None
         yield scan
 
 
@@ -126,7 +85,7 @@ def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:
     size = _size(folder, semantics)
     urdf = read_urdf(folder / URDF)
     compare_links(folder, urdf, semantics)
-    base, moving = placed_links(normalised_links(folder, urdf, semantics), size.side, size.length)
+    base, moving = placed_links(normalised_links(folder, urdf, semantics), size)
     return ArticulatedScan(
         name=item.name,
         category=size.category,

@@ -26,7 +26,7 @@ MAX_BYTES = 64 * 2**20  # the largest part of PartNet-Mobility has 5
 MAX_COORDINATE = 1e6  # published are models of size 2; beyond, squares lose all digits
 
 
-def read_wavefront(path: Path, images: Path) -> tuple[Surface, ...]:
+def read_wavefront(path: Path, images: Path, lacking: list[str]) -> tuple[Surface, ...]:
     """The meshes in an OBJ file, one for each material, in the file's own frame and units.
 
     Polygons become fans of triangles; lines and points are left out, and may leave nothing. What looks
@@ -35,6 +35,8 @@ def read_wavefront(path: Path, images: Path) -> tuple[Surface, ...]:
     Args:
       path: The file; its material library, if it names one, lies beside it.
       images: Folder of the textures; only their file names are taken from the library.
+      lacking: Takes a phrase for each library, material and texture that is not there; an object may lack
+        hundreds, which are worth one warning together.
 
     Raises:
       InputError: Missing, too large or no text; a line cannot be read; a face names a vertex that is
@@ -47,11 +49,16 @@ def read_wavefront(path: Path, images: Path) -> tuple[Surface, ...]:
         )
     materials: dict[str, Material] = {}
     for library in lines.libraries:
-        materials |= read_materials(path.parent / library, images)
+        if (path.parent / library).exists():
+            materials |= read_materials(path.parent / library, images)
+        else:
+            lacking.append(f"{path.parent / library} is not there")
     defects = list(lines.defects)
-    lacking = [n for n in lines.names if n and n not in materials]
-    if lacking and materials:
-        defects.append(f"material {lacking[0]!r} is not in {' '.join(lines.libraries)}; grey")
+    for name in filter(None, lines.names):
+        if name in materials and materials[name].lacks:
+            lacking.append(f"{path}: {materials[name].lacks}")
+        elif materials and name not in materials:
+            lacking.append(f"{path}: material {name!r} is not in {' '.join(lines.libraries)}")
     triangles, owners = _fans(lines.sizes)
     if len(triangles):
         points = lines.corners[triangles]

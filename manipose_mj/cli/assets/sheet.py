@@ -50,6 +50,12 @@ def draw_sheets(
 
     sheets = _built_in(category) if directory is None else _in_folder(directory, category)
     total, done = sum(map(len, sheets.values())), 0
+    if directory is None:
+        hint = "" if category else "; --category NAME draws fewer, DIR the assets of a folder"
+        output.standard_output().print(
+            f"no folder given: drawing {total} built-in objects of {len(sheets)} categories{hint}",
+            soft_wrap=True,
+        )
     pool = joblib.Parallel(n_jobs=jobs, return_as="generator")
     cells: Iterator[Cell] = pool(
         joblib.delayed(_cell)(entry, size) for entries in sheets.values() for entry in entries

@@ -259,6 +259,50 @@ def test_one_far_vertex_is_refused_before_it_costs_anything(drawn):
         read(drawn)
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_a_continuous_joint_is_a_door_where_it_hangs_by_an_edge(drawn, named):
+    urdf = drawn / "mobility.urdf"
+    text = urdf.read_text().replace(
+        'name="joint_0" type="revolute"', 'name="joint_0" type="continuous"'
+    )
+    if not named:
+        text = text.replace("cabinet_door_surface", "front").replace('"rotation_door', '"other')
+        semantics = drawn / "semantics.txt"
+        semantics.write_text(semantics.read_text().replace("rotation_door", "other"))
+    urdf.write_text(text)
+    door, *_, knob = read(drawn).moving
+    assert (door.role, knob.role) == ("door", "knob")
+    assert door.joint.travel == pytest.approx(np.pi / 2)
+    np.testing.assert_allclose(door.joint.axis, [0, 0, 1], atol=1e-9)  # as with limits: outwards
+
+
+def test_a_tray_turns_and_has_neither_handle_nor_cavity(drawn, tmp_path):
+    semantics = drawn / "semantics.txt"
+    semantics.write_text(semantics.read_text().replace("hinge knob", "hinge tray"))
+    built = build_articulated(read(drawn), tmp_path / "asset")
+    tray = built.part("tray_2")
+    assert (tray.joint.kind, tray.handle, tray.cavity) == ("hinge", None, None)
+
+
+def test_missing_materials_are_one_warning(drawn, caplog):
+    (drawn / "textured_objs" / "original.mtl").unlink()
+    read(drawn)
+    (told,) = [r.getMessage() for r in caplog.records if "original.mtl" in r.getMessage()]
+    assert str(drawn) in told and "more like it" in told
+
+
+def test_errors_name_the_folder_of_the_object(drawn, tmp_path, monkeypatch):
+    monkeypatch.setattr("asset_pipeline.sources.partnet_mobility.links.MAX_SIZE", 0.1)
+    (item,) = partnet_mobility.items(drawn.parent)
+    with pytest.raises(InputError) as refused, partnet_mobility.opened(item):
+        pass
+    assert str(refused.value).startswith(f"{drawn}: the object would measure")
+    (drawn / "meta.json").write_text(json.dumps({"model_cat": "Submarine"}))
+    (result,) = build("partnet_mobility", drawn.parent, tmp_path / "out")
+    assert result.reason.startswith(f"{drawn}: category 'Submarine'")
+    assert not list((tmp_path / "out").iterdir())
+
+
 def test_unknown_category_says_which_are_known(drawn):
     (drawn / "meta.json").write_text('{"model_cat": "Piano"}')
     with pytest.raises(InputError, match=r"'Piano'.*StorageFurniture"):

@@ -86,6 +86,17 @@ def test_command_draws_a_sheet_a_category(tmp_path, capsys, monkeypatch):
     assert "unknown category 'cabinett'; did you mean cabinet?" in capsys.readouterr().err
 
 
+def test_command_without_a_folder_says_what_it_is_about_to_draw(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("manipose_mj.cli.assets.sheet._built_in", lambda _: {"mug": [("mug", 0)]})
+    command = ["assets", "sheet", "--out", str(tmp_path), "--size", "48", "--jobs", "1"]
+    assert main(command) == 0
+    first, *_, last = capsys.readouterr().out.splitlines()
+    assert first.startswith(
+        "no folder given: drawing 1 built-in objects of 1 categories; --category"
+    )
+    assert last.startswith("1 sheets in")
+
+
 @pytest.mark.parametrize("arguments", [["--size", "8"], ["--category", "mugg"]])
 def test_bad_arguments_are_one_line(tmp_path, capsys, arguments):
     assert main(["assets", "sheet", "--out", str(tmp_path), *arguments]) == 2

@@ -1,0 +1,241 @@
+"""Own meshes: a file, or a folder of files, of any format that `files.mesh_file` reads.
+
+What the files do not say is said by who builds them (`MeshOptions`), or guessed, with a warning that names the
+guess. An object is named for its file, or for its folder where the file is called `model` or the like. The mesh
+frame is kept, scaled to metres. Nothing is claimed of where a mesh comes from.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from asset_pipeline.sources.categories import Kind, kind_of, kind_of_product
+from asset_pipeline.sources.files.mesh_file import (
+    ANONYMOUS,
+    MESHES,
+    MeshFile,
+    companions,
+    read_mesh_file,
+)
+from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up, suits
+from asset_pipeline.sources.scan import Scan, ScanItem, check_scan_mesh, sha256
+from manipose_mj.assets.asset import Provenance
+from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.label import ObjectType
+from manipose_mj.errors import InputError, unknown_name
+
+log = logging.getLogger(__name__)
+
+SOURCE = "own mesh"
+UNKNOWN_LICENCE = "unknown"
+TYPES: tuple[ObjectType, ...] = ("axial", "mirror", "functional")
+# In an asset's inputs: what was said of it.
+SAID = "as said"
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """What a person says of own meshes; None is guessed.
+
+    Attributes:
+      category: What kind of objects they are, such as `"mug"`.
+      object_type: Which labelling rule applies; without it the category's.
+      up: `"x"`, `"y"`, `"z"`, `"-x"`, `"-y"` or `"-z"`.
+      unit: `"m"`, `"cm"`, `"mm"`, `"in"`, `"ft"` or a number of metres.
+      licence: Under which the meshes may be used; without it the asset says that it is unknown.
+    """
+
+    category: str | None = None
+    object_type: ObjectType | None = None
+    up: str | None = None
+    unit: str | None = None
+    licence: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.category is not None and not self.category.strip():
+            raise InputError("the category is empty; expected a word such as mug")
+        if self.up is not None and self.up not in AXES:
+            raise unknown_name("axis", self.up, AXES)
+        if self.object_type is not None and self.object_type not in TYPES:
+            raise unknown_name("type", self.object_type, TYPES)
+        if self.unit is not None:
+            metres(self.unit)
+
+    def remarks(self) -> list[str]:
+        """What should be known before anything is built, one line each."""
+        found = []
+        if not self.licence:
+            found.append("no licence is stated: the assets will say 'unknown'; say --licence TEXT")
+        if self.category and self.object_type is None and self.category not in CATALOGUE:
+            kind = kind_of(self.category)
+            if kind.category not in CATALOGUE:
+                hint = unknown_name("category", self.category, CATALOGUE)
+                found.append(
+                    f"{hint} It is labelled as {kind.object_type}; say --type where that is wrong"
+                )
+        return found
+
+
+@dataclass(frozen=True)
+class MeshItem(ScanItem):
+    """A mesh file, and what was said of it."""
+
+    options: MeshOptions = field(default_factory=MeshOptions)
+
+    @property
+    def file(self) -> Path:
+        """The mesh."""
+        return self.path / self.member
+
+    @property
+    def where(self) -> str:
+        """What messages name: the file."""
+        return str(self.file)
+
+
+def metres(unit: str) -> float:
+    """The length of a unit [m].
+
+    Raises:
+      InputError: It is neither a known one nor a number above 0.
+    """
+    if unit in UNITS:
+        return UNITS[unit]
+    try:
+        length = float(unit)
+    except ValueError:
+        raise unknown_name("unit", unit, [*UNITS, "a number of metres"]) from None
+    if not 0 < length < np.inf:
+        raise InputError(f"unit {unit!r}; expected a number of metres above 0")
+    return length
+
+
+def items(path: Path, options: MeshOptions) -> list[MeshItem]:
+    """The meshes at `path`: the file itself, or those in the folder and in its folders.
+
+    Raises:
+      InputError: `path` does not exist, or holds no mesh.
+    """
+    expected = " ".join(MESHES)
+    if path.is_file():
+        if path.suffix.lower() not in MESHES:
+            raise InputError(f"{path}: no mesh that can be read; expected one of {expected}")
+        root, files = path.parent, [path]
+    elif path.is_dir():
+        root = path
+        files = [
+            file
+            for pattern in ("*", "*/*")
+            for file in sorted(path.glob(pattern))
+            if file.suffix.lower() in MESHES and file.is_file()
+        ]
+    else:
+        raise InputError(f"{path}: no such file or folder; expected a mesh or a folder of meshes")
+    if not files:
+        raise InputError(
+            f"{path}: holds no mesh; expected one of {expected}, there or a folder below"
+        )
+    names = [_name(file) for file in files]
+    counts = Counter(names)
+    found = {}
+    for file, name in zip(files, names, strict=True):
+        own = name if counts[name] == 1 else _spelt("_".join(file.relative_to(root).parts))
+        if own in found:
+            raise InputError(f"{path}: {found[own].file} and {file} have one name; rename one")
+        found[own] = MeshItem(own, root, str(file.relative_to(root)), options)
+    return [found[name] for name in sorted(found)]
+
+
+def inputs(item: MeshItem) -> dict[str, str]:
+    """The sha256 of every file that the object is built from, keyed by file name; and what was said of it.
+
+    Raises:
+      InputError: A file cannot be read.
+    """
+    hashes = {item.file.name: sha256(item.file)}
+    hashes |= {str(f.relative_to(item.file.parent)): sha256(f) for f in companions(item.file)}
+    said = {key: value for key, value in asdict(item.options).items() if value is not None}
+    return hashes | {SAID: ", ".join(f"{key}={value}" for key, value in said.items())}
+
+
+@contextmanager
+def opened(item: MeshItem) -> Iterator[Scan]:
+    """Read one object; its texture stays there as long as the context does.
+
+    Raises:
+      InputError: The mesh cannot be used, or no unit suits it.
+    """
+    options, file = item.options, item.file
+    found = read_mesh_file(file)
+    mesh, guesses = found.mesh, []
+    kind = kind_of(options.category or "")
+    if options.category is None:
+        kind = kind_of_product(item.name)
+        guesses.append(f"category {kind.category} by its name (--category)")
+    kind = Kind(kind.category, options.object_type or kind.object_type)
+    unit = options.unit
+    if unit is None:
+        unit, origin = _unit(found, kind.category, file)
+        size = metres(unit) * float(np.ptp(np.asarray(mesh.vertices), axis=0).max())
+        said = unit if unit in UNITS else f"of {unit} m"
+        guesses.append(f"unit {said} {origin}, so that it measures {size:.3g} m (--unit)")
+    mesh.vertices = metres(unit) * np.asarray(mesh.vertices)
+    check_scan_mesh(mesh, str(file), unit=metres(unit))
+    up = options.up
+    if up is None:
+        up = guess_up(mesh, kind.object_type, found.up)
+        guesses.append(f"{up} up (--up)")
+    if guesses:
+        log.warning("%s: not stated and taken to be: %s", file, "; ".join(guesses))
+    with tempfile.TemporaryDirectory(prefix="manipose-scan-") as scratch:
+        texture = None
+        if found.image is not None:
+            texture = Path(scratch) / "texture.png"
+            found.image.convert("RGB").save(texture)
+        yield Scan(
+            name=item.name,
+            category=kind.category,
+            object_type=kind.object_type,
+            mesh=mesh,
+            texture=texture,
+            up=np.array(AXES[up]),
+            mass=None,
+            provenance=Provenance(
+                SOURCE, item.member, options.licence or UNKNOWN_LICENCE, inputs(item)
+            ),
+            rgba=found.rgba,
+        )
+
+
+def _unit(found: MeshFile, category: str, file: Path) -> tuple[str, str]:
+    """The unit that nobody gave, and where it is from."""
+    vertices = np.asarray(found.mesh.vertices)
+    if not np.isfinite(vertices).all():
+        return "m", "for want of finite coordinates"  # which is refused next
+    longest = float(np.ptp(vertices, axis=0).max())
+    if found.unit is not None and suits(found.unit * longest, category):
+        return f"{found.unit:g}", "as the file says"
+    try:
+        return guess_unit(longest, category), "by its size"
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def _name(file: Path) -> str:
+    """Of the file; of its folder where the file's says nothing."""
+    anonymous = file.stem.lower() in ANONYMOUS
+    return _spelt(file.resolve().parent.name if anonymous else file.stem)
+
+
+def _spelt(text: str) -> str:
+    """With letters, digits and `_.-` only: it becomes a folder's name, and a name in MJCF."""
+    return re.sub(r"[^\w.-]+", "_", text).strip("._") or "object"
