@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
 
@@ -24,6 +25,7 @@ def evaluate(
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
+    dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
 
@@ -38,6 +40,8 @@ def evaluate(
       objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
         folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
+      dask: Run on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786, instead of --jobs; its
+        workers have to see --out and the folders of --objects.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_tasks
@@ -51,11 +55,12 @@ def evaluate(
     if episodes is None:
         episodes = EPISODES if protocol else 50
     config = EvaluationConfig(
-        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol
+        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol, dask=dask
     )
     named = check_names(tasks, objects)
-    # Once and here: workers would each build the same.
-    load_objects(named if objects else names_in_tasks(tasks, config.split), jobs)
+    with cluster(dask):
+        # Once, before the episodes: their workers would each build the same.
+        load_objects(named if objects else names_in_tasks(tasks, config.split), jobs)
     return run_and_report(config, resume=resume)
 
 
