@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.free_motion import plan_path
@@ -77,6 +77,12 @@ class MotionPlanner:
     def collides(self, joints: Float[np.ndarray, "7"], query: CollisionQuery) -> bool:
         """Whether the arm, with what is attached, is too close to anything."""
         return self.scene.in_collision(joints, self._allowing(query))
+
+    def obstacles(
+        self, joints: Float[np.ndarray, "7"], query: CollisionQuery
+    ) -> Bool[np.ndarray, "ngeom"]:
+        """Mask of the geoms that the arm, with what is attached, is too close to."""
+        return self.scene.obstacles(joints, self._allowing(query))
 
     def free_path(
         self,
