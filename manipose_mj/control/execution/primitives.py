@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
-from manipose_mj.control.grasping.object_push import push_object
+from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     MIN_SHARE,
     ending_free,
@@ -30,7 +30,7 @@ from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retr
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
-from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, AttachedObject, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
@@ -147,6 +147,9 @@ class Primitives:
         estimate, planner = self._observe(planner)
         pose_tcp = self._check_held(estimate, name)
         place = _place(planner, estimate, step, pose_tcp, pick.goal)
+        if place is None and self._held is not None:
+            # What hangs down in the hand turns back as it meets the table.
+            place = _place(planner, estimate, step, self._held.pose_tcp, pick.goal)
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
         attached = estimate.in_hand(name)
@@ -216,8 +219,12 @@ class Primitives:
         for targets in (push.free_path, push.down, push.along):
             yield from self._executor.follow(targets)
         estimate, planner = self._observe(planner)
-        yield from self._executor.follow(_retreat(planner, estimate, name))
         moved = estimate.objects[name].label_pose[:2, 3] - obj.label_pose[:2, 3]
+        hand = planner.tcp_pose(push.along[-1])[:2, 3] - planner.tcp_pose(push.along[0])[:2, 3]
+        back = leave_pushed(planner, estimate.joints, estimate.objects[name], hand)
+        if back is None:
+            raise StageFailure("release", f"no way to leave {name} after a push")
+        yield from self._executor.follow(back)
         if float(np.linalg.norm(moved)) < _PUSHED:
             raise StageFailure("motion", f"{name} did not move when it was pushed")
 
@@ -291,11 +298,11 @@ def _place(
     pose_tcp: Float[np.ndarray, "4 4"],
     near: Float[np.ndarray, "7"],
 ) -> Place | None:
-    """How to set down what is held at `T_tcp_label`, near a configuration [rad]."""
-    symmetry = estimate.objects[step.subject].label.symmetry
+    """How to set down what is held, as if it were held at `T_tcp_label`, near a configuration [rad]."""
+    obj = estimate.objects[step.subject]
     way = way_out(estimate, step.poses[0][:3, 3])
-    attached = estimate.in_hand(step.subject)
-    return find_place(planner, pose_tcp, step.poses, symmetry, attached, near, way)
+    attached = AttachedObject(obj.body, obj.geoms, pose_tcp @ invert(obj.label.pose))
+    return find_place(planner, pose_tcp, step.poses, obj.label.symmetry, attached, near, way)
 
 
 def _placed_again(

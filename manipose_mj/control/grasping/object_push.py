@@ -13,7 +13,8 @@ from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 
 _GAP = 0.022  # between the TCP and the side that it pushes, before it starts [m]
-_HEIGHTS = (0.012, 0.018, 0.026)  # of the TCP above the table, beside the object's middle [m]
+# Of the TCP above the table, best first [m]: low, so that what stands does not fall.
+_HEIGHTS = (0.02, 0.03, 0.012)
 _RISES = (0.12, 0.07)  # from which the hand comes down beside the object [m]
 _TURNS = 4  # of the hand about the vertical
 # Other things may be brushed as far as the planner allows, what is pushed as far as the push goes.
@@ -52,6 +53,28 @@ def push_object(
     return None
 
 
+def leave_pushed(
+    planner: MotionPlanner,
+    joints: Float[np.ndarray, "7"],
+    obj: ObjectEstimate,
+    direction: Float[np.ndarray, "2"],
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets back from what was pushed along `direction` and up, or straight up; None if there are none."""
+    query = CollisionQuery(_PUSHING, target=obj.geoms)
+    shift = -_GAP * direction / max(float(np.linalg.norm(direction)), _GAP)
+    for back in (shift, np.zeros(2)):
+        for rise in _RISES:
+            beside = planner.tcp_pose(joints)
+            beside[:2, 3] += back
+            above = beside.copy()
+            above[2, 3] += rise
+            first = planner.line(joints, beside, query) if back.any() else joints[None]
+            second = None if first is None else planner.line(first[-1], above, query)
+            if first is not None and second is not None:
+                return np.concatenate([first, second])
+    return None
+
+
 def _starts(obj: ObjectEstimate, shift: Float[np.ndarray, "2"]) -> Float[np.ndarray, "n 4 4"]:
     """`T_world_tcp` beside the object, pointing down, the likeliest heights first."""
     direction = np.array([*shift, 0.0]) / np.linalg.norm(shift)
@@ -60,10 +83,9 @@ def _starts(obj: ObjectEstimate, shift: Float[np.ndarray, "2"]) -> Float[np.ndar
     middle = obj.label_pose[:3, 3]
     at = middle - direction * (half + _GAP)
     top = middle[2] + float(np.abs(rotation[2]) @ obj.label.extents) / 2
-    heights = dict.fromkeys((max(middle[2], _HEIGHTS[0]), *_HEIGHTS))
     poses = []
-    for height in heights:
-        if height > max(top, _HEIGHTS[0]):
+    for height in _HEIGHTS:
+        if height > max(top, _HEIGHTS[-1]):
             continue
         for turn in range(_TURNS):
             angle = np.arctan2(direction[1], direction[0]) + turn * np.pi / 2

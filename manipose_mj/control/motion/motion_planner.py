@@ -70,6 +70,12 @@ class MotionPlanner:
         pose[:3, 3] -= distance * pose[:3, 2]
         return pose
 
+    def raised(self, joints: Float[np.ndarray, "7"], distance: float) -> Float[np.ndarray, "4 4"]:
+        """The TCP's pose after going straight up [m]."""
+        pose = self.tcp_pose(joints)
+        pose[2, 3] += distance
+        return pose
+
     def body_name(self, body: int) -> str:
         """The name of a body of the scene."""
         return self.scene.model.body(body).name

@@ -70,9 +70,9 @@ def candidate_moves(
     ready = {goal.object: goal for goal in unmet if not in_place[goal.object]}
 
     @cache
-    def aside(name: str) -> Plan:
+    def aside(name: str, attempt: int) -> Plan:
         """Taken and set down elsewhere; no steps where the table is full."""
-        poses = places_aside(estimate.objects[name], pose_goals, estimate, planner)
+        poses = places_aside(estimate.objects[name], pose_goals, estimate, planner, attempt)
         return place(name, poses) if poses else ()
 
     @cache
@@ -90,7 +90,7 @@ def candidate_moves(
             return CandidatePlan(
                 partial(_route, ready[name], estimate, pushing, attempt), allowance
             )
-        plan = () if name in done else aside(name)
+        plan = () if name in done else aside(name, attempt)
         return CandidatePlan(lambda: plan, allowance) if plan else None
 
     attempts = range(len(_CONTACT_ALLOWANCES))

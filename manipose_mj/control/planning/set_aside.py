@@ -46,6 +46,7 @@ def places_aside(
     goals: Sequence[PoseGoal],
     estimate: SceneEstimate,
     planner: MotionPlanner,
+    attempt: int = 0,
 ) -> Poses:
     """`T_world_label` where the object is out of everybody's way, turned as little as it can be.
 
@@ -54,6 +55,7 @@ def places_aside(
       goals: Kept free for their objects.
       estimate: What is where.
       planner: Plans in the scene of `estimate`.
+      attempt: The nearest places come at the first, 0; the next ones and other sides down at each later one.
 
     Returns:
       Poses with as much room around them as there is; none where the table is full.
@@ -63,7 +65,8 @@ def places_aside(
     wanted = [(goal.pose[:2, 3], radius(estimate.objects[goal.object])) for goal in goals]
     own = obj.label_pose[:2, 3]
     order = sorted(_PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
-    rotations = _rest_rotations(obj)
+    rotations = _rest_rotations(obj, _MAX_RESTS * (attempt + 1))
+    enough = _MAX_PLACES * len(rotations)
     for room in _ROOMS:
         turns = (0.0,) if np.isfinite(room) else (0.0, _QUARTER, -_QUARTER)
         found: list[Float[np.ndarray, "4 4"]] = []
@@ -74,10 +77,10 @@ def places_aside(
                 continue
             poses = (pose for turn in turns for pose in _poses_at(obj, rotations, xy, turn))
             found += [pose for pose in poses if is_free(planner, obj, pose)]
-            if len(found) >= _MAX_PLACES * len(rotations):
+            if len(found) >= enough * (attempt + 1):
                 break
         if found:
-            return tuple(found)
+            return tuple(found[enough * attempt :] or found[-enough:])
     return ()
 
 
@@ -132,7 +135,7 @@ def _poses_at(
         yield compose(turned, np.array([*xy, resting_height(obj, turned) + DROP_HEIGHT]))
 
 
-def _rest_rotations(obj: ObjectEstimate) -> list[Float[np.ndarray, "3 3"]]:
+def _rest_rotations(obj: ObjectEstimate, most: int) -> list[Float[np.ndarray, "3 3"]]:
     """`R_world_label` of the stable poses nearest to how the object lies now."""
     own = obj.label_pose[:3, :3]
     up = own[2] @ obj.label.rotation.T
@@ -141,7 +144,7 @@ def _rest_rotations(obj: ObjectEstimate) -> list[Float[np.ndarray, "3 3"]]:
         for k, rest in enumerate(obj.rests)
         if len(obj.grasps) and obj.grasps.clear[:, k].sum() >= _MIN_CLEAR
     ]
-    nearest = sorted(graspable, key=lambda rest: -float(rest.rotation[2] @ up))[:_MAX_RESTS]
+    nearest = sorted(graspable, key=lambda rest: -float(rest.rotation[2] @ up))[:most]
     if not nearest:
         return [own]
     rotations = []
