@@ -127,21 +127,7 @@ class Baseline:
                 if step_by_step and not acted:
                     continue  # all is where it was: the next candidate
                 candidates = None
-                self.status = "recover"
-                try:
-                    estimate = executor.observe()
-                    held = estimate.objects.get(primitives.held or "")
-                    lies = step_by_step and held is not None and is_supported(held, estimate.scene)
-                    yield from let_go_safely(
-                        primitives,
-                        planner,
-                        estimate,
-                        failure,
-                        supported=lies,
-                        among_others=step_by_step,
-                    )
-                except StageFailure:
-                    raise failure from None
+                yield from self._recover(executor, primitives, planner, failure, step_by_step)
         self.status = "done"
         yield from executor.wait(0.5)
 
@@ -157,6 +143,30 @@ class Baseline:
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()
+
+    def _recover(
+        self,
+        executor: Executor,
+        primitives: Primitives,
+        planner: MotionPlanner,
+        failure: StageFailure,
+        step_by_step: bool,
+    ) -> Iterator[Action]:
+        """Empty the hand so that another plan can be made; where that fails too, raise the failure.
+
+        In clutter an empty hand will do, wherever it is.
+        """
+        self.status = "recover"
+        estimate = executor.observe()
+        held = estimate.objects.get(primitives.held or "")
+        lies = step_by_step and held is not None and is_supported(held, estimate.scene)
+        try:
+            yield from let_go_safely(
+                primitives, planner, estimate, failure, supported=lies, among_others=step_by_step
+            )
+        except StageFailure:
+            if not step_by_step or primitives.held is not None:
+                raise failure from None
 
 
 def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:
