@@ -16,6 +16,7 @@ _GAP = 0.022  # between the TCP and the side that it pushes, before it starts [m
 # Of the TCP above the table, best first [m]: low, so that what stands does not fall.
 _HEIGHTS = (0.02, 0.03, 0.012)
 _RISES = (0.12, 0.07)  # from which the hand comes down beside the object [m]
+_MAX_LINES = 48  # pushes tried from starts that are free
 _TURNS = 4  # of the hand about the vertical
 # Other things may be brushed as far as the planner allows, what is pushed as far as the push goes.
 _PUSHING = replace(CONTACT, arm=0.002, target=-np.inf)
@@ -44,12 +45,22 @@ def push_object(
       obj: What to push.
       destinations: `T_world_label`, of which only the places on the table count.
     """
-    for destination in destinations:
-        shift = destination[:2, 3] - obj.label_pose[:2, 3]
-        for start in _starts(obj, shift):
-            push = _push(planner, estimate, obj, start, shift)
-            if push is not None:
-                return push
+    shifts = [destination[:2, 3] - obj.label_pose[:2, 3] for destination in destinations]
+    starts = [(start, shift) for shift in shifts for start in _starts(obj, shift)]
+    # Turns of the hand last: first every place and height with one of them.
+    starts = [start for turn in range(_TURNS) for start in starts[turn::_TURNS]]
+    if not starts:
+        return None
+    reach = reachable(np.array([start for start, _ in starts]), estimate.joints)
+    query = CollisionQuery(_PUSHING, opening=0.0, target=obj.geoms)
+    lines = 0
+    for index, joints in zip(reach.index, reach.joints, strict=True):
+        if planner.collides(joints, query) or lines == _MAX_LINES:
+            continue
+        lines += 1
+        push = _push(planner, estimate, joints, *starts[int(index)], query)
+        if push is not None:
+            return push
     return None
 
 
@@ -100,15 +111,12 @@ def _starts(obj: ObjectEstimate, shift: Float[np.ndarray, "2"]) -> Float[np.ndar
 def _push(
     planner: MotionPlanner,
     estimate: SceneEstimate,
-    obj: ObjectEstimate,
+    joints: Float[np.ndarray, "7"],
     start: Float[np.ndarray, "4 4"],
     shift: Float[np.ndarray, "2"],
+    query: CollisionQuery,
 ) -> ObjectPush | None:
-    query = CollisionQuery(_PUSHING, opening=0.0, target=obj.geoms)
-    reach = reachable(start[None], estimate.joints)
-    if not len(reach.index) or planner.collides(reach.joints[0], query):
-        return None
-    joints = reach.joints[0]
+    """From these joints, which have the TCP at `start`."""
     end = start.copy()
     end[:2, 3] += shift * (1 + _GAP / float(np.linalg.norm(shift)))
     along = planner.line(joints, end, query)

@@ -50,7 +50,8 @@ def candidate_moves(
     """Next moves, the most promising first; a single one without steps when every pose is reached.
 
     First what brings a target to its goal, or starts the shortest order that lets one be brought there, past
-    neighbours that may give way ever more; then such orders with pushes among them; then anything near.
+    neighbours that may give way ever more; then such orders with pushes among them; then anything near, which at
+    last is pushed.
 
     Args:
       goals: All of them.
@@ -104,6 +105,9 @@ def candidate_moves(
     nearby = _near(unmet, in_place, estimate, planner)
     for attempt in attempts:
         yield from filter(None, (taken(name, attempt) for name in nearby))
+    for name in nearby:
+        if plan := pushed(name):
+            yield CandidatePlan(lambda plan=plan: plan, _CONTACT_ALLOWANCES[-1])
     raise InputError(f"nothing can be moved any more towards {unmet[0].object}'s goal")
 
 

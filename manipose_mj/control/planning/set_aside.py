@@ -36,7 +36,7 @@ _MAX_RESTS = 2
 _PUSHES = (0.10, 0.06)
 _DIRECTIONS = 12
 _NEAREST, _FARTHEST, _WIDEST = 0.30, 0.72, 0.55
-_MAX_PUSHES = 6
+_MAX_PUSHES = 8
 _MIN_CLEAR = 3  # grasps of a stable pose that make it worth setting something down in
 _QUARTER = np.pi / 2
 
@@ -90,7 +90,7 @@ def places_pushed(
     estimate: SceneEstimate,
     planner: MotionPlanner,
 ) -> Poses:
-    """`T_world_label` a push away, turned as it is: free ones, the farthest from other things first.
+    """`T_world_label` a push away, turned as it is: the farthest from other things first, free ones before the rest.
 
     Arguments as for `places_aside`.
     """
@@ -107,9 +107,10 @@ def places_pushed(
             if in_reach and _gap((x, y), wanted) > radius(obj):
                 raised = pose.copy()
                 raised[2, 3] += DROP_HEIGHT
-                if is_free(planner, obj, raised):
-                    found.append((_gap((x, y), taken), pose))
-    return tuple(pose for _, pose in sorted(found, key=lambda each: -each[0])[:_MAX_PUSHES])
+                free = is_free(planner, obj, raised)
+                found.append((free, _gap((x, y), taken), pose))
+    found.sort(key=lambda each: each[:2], reverse=True)
+    return tuple(pose for _, _, pose in found[:_MAX_PUSHES])
 
 
 def radius(obj: ObjectEstimate) -> float:
