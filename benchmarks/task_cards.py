@@ -15,8 +15,10 @@ from dm_control import composer
 from PIL import Image
 
 from manipose_mj import suite
+from manipose_mj.assets import catalogue
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.protocol.freeze import builtin_tasks
+from manipose_mj.evaluation.protocol.frozen import FrozenTask
 from manipose_mj.gym import env_id
 from manipose_mj.mjcf.cameras.pictures import render
 from manipose_mj.tasks.core.registry import TaskSpec

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError
 
@@ -76,7 +75,7 @@ def build_assets(
             f"leave them out, {source} knows its objects"
         )
     done: list[BuildResult] = []
-    with _cluster(dask), output.Progress("assets") as progress:
+    with cluster(dask), output.Progress("assets") as progress:
 
         def show(result: BuildResult, total: int) -> None:
             done.append(result)
@@ -120,30 +119,3 @@ def build_assets(
         soft_wrap=True,
     )
     return 2 if failed else 0
-
-
-@contextmanager
-def _cluster(address: str | None) -> Iterator[None]:
-    """Run joblib's work on a dask cluster, if there is an address.
-
-    Raises:
-      InputError: `dask.distributed` is not installed, or nobody answers.
-    """
-    if address is None:
-        yield
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(
-            "--dask needs dask.distributed; pip install 'manipose-mj[cluster]'"
-        ) from None
-    import joblib
-
-    try:
-        client = Client(address)
-    except (OSError, ValueError) as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"--dask {address}: no scheduler answers ({reason})") from None
-    with client, joblib.parallel_config(backend="dask"):
-        yield

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
 
@@ -24,6 +25,7 @@ def evaluate(
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
+    dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
 
@@ -38,6 +40,8 @@ def evaluate(
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
+      dask: Run on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786, instead of --jobs; its
+        workers have to see --out and the folders of --objects.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
@@ -51,13 +55,15 @@ def evaluate(
     if episodes is None:
         episodes = EPISODES if protocol else 50
     config = EvaluationConfig(
-        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol
+        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol, dask=dask
     )
     named = check_names(tasks, objects)
     if protocol is not None:
         named = names_in_protocol(protocol, tasks, episodes)
-    # Once and here: workers would each build the same. What seeds draw is built when it is drawn.
-    load_objects(named, jobs)
+    with cluster(dask):
+        # Once, before the episodes: their workers would each build the same. What seeds draw is built when it is
+        # drawn.
+        load_objects(named, jobs)
     return run_and_report(config, resume=resume)
 
 

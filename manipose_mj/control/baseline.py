@@ -42,9 +42,9 @@ class _Progress:
         """Something was set down."""
         self.failures_here, self._last = 0, ""
 
-    def failed_again(self, plan: Plan) -> bool:
-        """Count a failure; whether it is of the plan that failed before."""
-        self.failures_here += 1
+    def failed_again(self, plan: Plan, *, counts: bool) -> bool:
+        """Count a failure, if it `counts`; whether it is of the plan that failed before."""
+        self.failures_here += counts
         text = plan_to_json(plan)
         same, self._last = text == self._last, text
         return same
@@ -111,39 +111,44 @@ class Baseline:
         primitives = Primitives(executor)
         rng = np.random.default_rng(seed)
         progress, failures, allowance = _Progress(), 0, 0.0
+        candidates: Iterator[CandidatePlan] | None = None
         while True:
-            estimate = executor.observe()
-            planner = MotionPlanner(estimate.scene, scene.arm, timestep, rng, allowance)
-            step_by_step = in_clutter(task.goals, estimate)
             try:
-                candidates = candidate_plans(task.goals, estimate, planner)
-                candidate = _after(candidates, progress.failures_here)
+                if candidates is None:
+                    estimate = executor.observe()
+                    planner = MotionPlanner(estimate.scene, scene.arm, timestep, rng, allowance)
+                    step_by_step = in_clutter(task.goals, estimate)
+                    candidates = candidate_plans(task.goals, estimate, planner)
+                    candidate = _after(candidates, progress.failures_here)
+                else:
+                    candidate = next(candidates)
                 plan = candidate.steps()
             except InputError as error:
                 raise StageFailure("plan", str(error)) from None
             # It stands until another plan is chosen.
             allowance = candidate.contact_allowance
             planner = planner.allowing(allowance)
+            acted = False
             try:
-                yield from self._carry_out(plan, planner, primitives, progress)
+                for action in self._carry_out(plan, planner, primitives, progress):
+                    acted = True
+                    yield action
                 if not (step_by_step and plan):
                     break
+                candidates = None
             except StageFailure as failure:
                 failures += 1
                 most = MAX_FAILED_MOVES if step_by_step else MAX_PLANS
                 # In clutter the same plan may be carried out another way.
-                same = progress.failed_again(plan) and not step_by_step
-                exhausted = same or failures == most
-                if exhausted or failure.stage not in _WORTH_ANOTHER_PLAN:
+                same = progress.failed_again(plan, counts=acted or not step_by_step)
+                exhausted = (same and not step_by_step) or failures == most
+                mends = (*_WORTH_ANOTHER_PLAN, "release") if step_by_step else _WORTH_ANOTHER_PLAN
+                if exhausted or failure.stage not in mends:
                     raise
-                self.status = "recover"
-                try:
-                    estimate = executor.observe()
-                    held = estimate.objects.get(primitives.held or "")
-                    lies = step_by_step and held is not None and is_supported(held, estimate.scene)
-                    yield from let_go_safely(primitives, planner, estimate, failure, supported=lies)
-                except StageFailure:
-                    raise failure from None
+                if step_by_step and not acted:
+                    continue  # all is where it was: the next candidate
+                candidates = None
+                yield from self._recover(executor, primitives, planner, failure, step_by_step)
         self.status = "done"
         yield from executor.wait(0.5)
 
@@ -159,6 +164,30 @@ class Baseline:
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()
+
+    def _recover(
+        self,
+        executor: Executor,
+        primitives: Primitives,
+        planner: MotionPlanner,
+        failure: StageFailure,
+        step_by_step: bool,
+    ) -> Iterator[Action]:
+        """Empty the hand so that another plan can be made; where that fails too, raise the failure.
+
+        In clutter an empty hand will do, wherever it is.
+        """
+        self.status = "recover"
+        estimate = executor.observe()
+        held = estimate.objects.get(primitives.held or "")
+        lies = step_by_step and held is not None and is_supported(held, estimate.scene)
+        try:
+            yield from let_go_safely(
+                primitives, planner, estimate, failure, supported=lies, among_others=step_by_step
+            )
+        except StageFailure:
+            if not step_by_step or primitives.held is not None:
+                raise failure from None
 
 
 def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:

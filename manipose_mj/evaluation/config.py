@@ -33,6 +33,8 @@ class EvaluationConfig:
         folders of them.
       protocol: Version of the protocol whose seeds and test objects to take instead of `seed` and the
         training objects.
+      dask: Address of a dask scheduler whose workers run the episodes instead of `jobs` processes of this
+        machine; they have to see `out` and the folders of `objects`. Results do not depend on it.
     """
 
     tasks: tuple[str, ...]
@@ -43,6 +45,7 @@ class EvaluationConfig:
     jobs: int = 1
     objects: tuple[str, ...] | None = None
     protocol: str | None = None
+    dask: str | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -125,6 +128,8 @@ class EvaluationConfig:
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:
             words += ["--objects", *self.objects]
+        if self.dask is not None:
+            words += ["--dask", self.dask]
         return shlex.join(words)
 
 

@@ -8,10 +8,13 @@ import os
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
+from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
+from manipose_mj.console.cluster import cluster
 from manipose_mj.errors import InputError, WorkerDiedError
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import (
@@ -32,6 +35,9 @@ if TYPE_CHECKING:
 RESULTS_FILE = "results.jsonl"
 SUMMARY_FILE = "summary.json"
 RUN_FILE = "run.json"
+
+# Episodes of one process share their compiled environments, and a dask worker may have several threads.
+_one_at_a_time = Lock()
 
 logger = logging.getLogger(__name__)
 
@@ -85,13 +91,13 @@ def evaluate(
       The results in the order of task and episode.
 
     Raises:
-      InputError: The folder cannot be written or holds results of something else, or an episode's
-        input is wrong.
+      InputError: The folder cannot be written or holds results of something else, an episode's
+        input is wrong, or there is no such cluster.
       WorkerDiedError: A worker process was killed; what had ended is kept.
     """
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
-    with _results_file(config.out) as file:
+    with cluster(config.dask), _results_file(config.out) as file:
         results = _kept_results(config, identity, file, resume)
         if not results:
             run = {**identity, "jobs": config.jobs, "command": config.command, "machine": machine()}
@@ -189,7 +195,7 @@ def _outcomes(
     config: EvaluationConfig, runner: Runner, episodes: list[tuple[str, int]]
 ) -> Iterator[EpisodeResult]:
     """Results as the episodes end, in any order."""
-    if config.jobs == 1 or len(episodes) <= 1:
+    if config.dask is None and (config.jobs == 1 or len(episodes) <= 1):
         for task, episode in episodes:
             yield run_one(config, runner, task, episode)
         return
@@ -197,11 +203,13 @@ def _outcomes(
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     # One thread per worker: else every worker's BLAS takes all cores, and sums change their order.
-    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+    here: dict[str, Any] = {"backend": "loky", "inner_max_num_threads": 1}
+    with joblib.parallel_config(**here) if config.dask is None else nullcontext():
         # Batches would hold finished episodes back.
         options: Any = {"return_as": "generator_unordered", "batch_size": 1}
         pool: Any = joblib.Parallel(n_jobs=min(config.jobs, len(episodes)), **options)
-        outcomes = pool(joblib.delayed(run_one)(config, runner, *key) for key in episodes)
+        wherever = _independent_of_folder(config)
+        outcomes = pool(joblib.delayed(run_one)(wherever, runner, *key) for key in episodes)
     try:
         yield from outcomes
     except TerminatedWorkerError as error:
@@ -209,6 +217,18 @@ def _outcomes(
             f"a worker process died ({' '.join(str(error).split())[:200]}); finished episodes are "
             f"kept in {config.out}: repeat with --resume, and fewer --jobs if memory ran out"
         ) from None
+
+
+def _independent_of_folder(config: EvaluationConfig) -> EvaluationConfig:
+    """The same evaluation for workers that run in another folder."""
+    if config.dask is None:
+        return config
+    from manipose_mj.tasks.core.object_selection import is_folder
+
+    objects = config.objects and tuple(
+        str(Path(each).absolute()) if is_folder(each) else each for each in config.objects
+    )
+    return replace(config, out=config.out.absolute(), objects=objects)
 
 
 def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -> EpisodeResult:
@@ -222,9 +242,10 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     start = time.perf_counter()
     try:
         spec = config.episode_spec(task, episode)
-        result, trajectory = runner(
-            config.env_config(task), spec, episode=episode, pose=config.pose
-        )
+        with _one_at_a_time:
+            result, trajectory = runner(
+                config.env_config(task), spec, episode=episode, pose=config.pose
+            )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
     except (InputError, OSError, MemoryError):
         raise

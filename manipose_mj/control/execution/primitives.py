@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     MIN_SHARE,
     ending_free,
@@ -21,6 +22,7 @@ from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object,
 from manipose_mj.control.grasping.retraction import (
     Place,
     find_place,
+    lowering,
     retractions,
     transport_path,
 )
@@ -28,6 +30,7 @@ from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retr
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
+from manipose_mj.control.scene.collision_query import CONTACT, AttachedObject, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
@@ -41,8 +44,12 @@ _SLIP = (0.002, 0.02)
 _BIG_SLIP = (0.01, 0.08)
 # Of a part's joint from where it should have gone, as a share of its range.
 _OPENING_TOLERANCE = 0.12
+_PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _SETTLE = 0.25  # after letting go [s]
+# How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
+_LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
+_GIVING_WAY = (0.006, 0.012)
 
 
 @dataclass(frozen=True)
@@ -95,7 +102,7 @@ class Primitives:
         if self._held is None and step.opening is not None:
             yield from self._push_part(planner, step.subject, step.opening)
         elif self._held is None:
-            raise StageFailure("plan", f"move_to {step.subject} while nothing is held")
+            yield from self._push_object(planner, step)
         elif isinstance(self._held.pick, PartPick):
             yield from self._move_part(planner, step)
         else:
@@ -108,15 +115,25 @@ class Primitives:
             raise StageFailure("plan", f"release {name} while nothing is held")
         yield from self._let_go(planner, name)
 
+    def lower(self, planner: MotionPlanner, name: str) -> Actions:
+        """Take what is held straight down until it nearly meets something."""
+        estimate, planner = self._observe(planner)
+        line = lowering(planner, estimate.joints, estimate.in_hand(name))
+        if line is not None:
+            yield from self._executor.follow(line)
+
+    def observe(self) -> SceneEstimate:
+        """A fresh estimate."""
+        return self._executor.observe()
+
     def _observe(self, planner: MotionPlanner) -> tuple[SceneEstimate, MotionPlanner]:
         """A new estimate, and the planner in its scene."""
         estimate = self._executor.observe()
         return estimate, planner.within(estimate.scene)
 
     def _let_go(self, planner: MotionPlanner, name: str) -> Actions:
-        estimate = self._executor.observe()
-        opening = min(estimate.opening + OPENING_MARGIN, MAX_OPENING)
-        yield from self._executor.open_to(opening)
+        estimate, planner = self._observe(planner)
+        yield from self._executor.open_to(_letting_go(planner, estimate, name))
         yield from self._executor.wait(_SETTLE)
         self._executor.hold(None)
         estimate, planner = self._observe(planner)
@@ -130,6 +147,9 @@ class Primitives:
         estimate, planner = self._observe(planner)
         pose_tcp = self._check_held(estimate, name)
         place = _place(planner, estimate, step, pose_tcp, pick.goal)
+        if place is None and self._held is not None:
+            # What hangs down in the hand turns back as it meets the table.
+            place = _place(planner, estimate, step, self._held.pose_tcp, pick.goal)
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
         attached = estimate.in_hand(name)
@@ -187,6 +207,27 @@ class Primitives:
         if abs(moved - opening) > _OPENING_TOLERANCE * (high - low):
             raise StageFailure("motion", f"{name} is at {moved:.3f}, should be at {opening:.3f}")
 
+    def _push_object(self, planner: MotionPlanner, step: Step) -> Actions:
+        """With closed fingers, over the table, then up."""
+        name = step.subject
+        estimate, planner = self._observe(planner)
+        obj = estimate.objects[name]
+        push = push_object(planner, estimate, obj, step.poses)
+        if push is None:
+            raise StageFailure("plan", f"no way to push {name}")
+        yield from self._executor.close()
+        for targets in (push.free_path, push.down, push.along):
+            yield from self._executor.follow(targets)
+        estimate, planner = self._observe(planner)
+        moved = estimate.objects[name].label_pose[:2, 3] - obj.label_pose[:2, 3]
+        hand = planner.tcp_pose(push.along[-1])[:2, 3] - planner.tcp_pose(push.along[0])[:2, 3]
+        back = leave_pushed(planner, estimate.joints, estimate.objects[name], hand)
+        if back is None:
+            raise StageFailure("release", f"no way to leave {name} after a push")
+        yield from self._executor.follow(back)
+        if float(np.linalg.norm(moved)) < _PUSHED:
+            raise StageFailure("motion", f"{name} did not move when it was pushed")
+
     def _check_held(self, estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
         """`T_tcp_label` now.
 
@@ -220,25 +261,34 @@ def retraction_of(
     raise StageFailure("plan", f"no way to lift {name}")
 
 
+def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
+    """How far to open [m]: as far as neighbours allow."""
+    released = estimate.parts.get(name) or estimate.objects[name]
+    for margin in _LETTING_GO:
+        opening = min(estimate.opening + margin, MAX_OPENING)
+        query = CollisionQuery(replace(CONTACT, arm=0.0), opening=opening, target=released.geoms)
+        if not planner.collides(estimate.joints, query):
+            return opening
+    return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
+
+
 def _retreat(
     planner: MotionPlanner, estimate: SceneEstimate, name: str
 ) -> Float[np.ndarray, "t 7"]:
-    """Joint targets back off from what was let go.
+    """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
 
     Raises:
       StageFailure: There is no way.
     """
     released = estimate.parts.get(name) or estimate.objects[name]
-    line = retreat(
-        planner,
-        estimate,
-        released.geoms,
-        frozenset({planner.body_name(released.body)}),
-        HANDLE_RETREATS if name in estimate.parts else RETREATS,
-    )
-    if line is None:
-        raise StageFailure("release", f"no way to back off from {name}")
-    return line
+    distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
+    touched = frozenset({planner.body_name(released.body)})
+    for allowance in (planner.contact_allowance, *_GIVING_WAY):
+        pushing = planner.allowing(max(allowance, planner.contact_allowance))
+        line = retreat(pushing, estimate, released.geoms, touched, distances)
+        if line is not None:
+            return line
+    raise StageFailure("release", f"no way to back off from {name}")
 
 
 def _place(
@@ -248,11 +298,11 @@ def _place(
     pose_tcp: Float[np.ndarray, "4 4"],
     near: Float[np.ndarray, "7"],
 ) -> Place | None:
-    """How to set down what is held at `T_tcp_label`, near a configuration [rad]."""
-    symmetry = estimate.objects[step.subject].label.symmetry
+    """How to set down what is held, as if it were held at `T_tcp_label`, near a configuration [rad]."""
+    obj = estimate.objects[step.subject]
     way = way_out(estimate, step.poses[0][:3, 3])
-    attached = estimate.in_hand(step.subject)
-    return find_place(planner, pose_tcp, step.poses, symmetry, attached, near, way)
+    attached = AttachedObject(obj.body, obj.geoms, pose_tcp @ invert(obj.label.pose))
+    return find_place(planner, pose_tcp, step.poses, obj.label.symmetry, attached, near, way)
 
 
 def _placed_again(

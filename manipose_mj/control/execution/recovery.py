@@ -9,6 +9,7 @@ from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.regrasp import Poses
+from manipose_mj.control.planning.set_aside import places_aside
 from manipose_mj.control.planning.table_places import poses_with_rotation, resting_rotation
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
@@ -21,10 +22,17 @@ def let_go_safely(
     failure: StageFailure,
     *,
     supported: bool = False,
+    among_others: bool = False,
 ) -> Actions:
     """Set down what is held on the table, as it lies in the hand; let go of a handle where it is.
 
-    So too of what lies on something yet: `supported`.
+    Args:
+      primitives: What holds it.
+      planner: Says what to assume.
+      estimate: What is where.
+      failure: Of the plan.
+      supported: What is held lies on something yet: let go of it where it is, too.
+      among_others: Where there is no room on the table, lower it onto what lies under it.
 
     Raises:
       StageFailure: It cannot be done.
@@ -34,8 +42,27 @@ def let_go_safely(
         return
     if name in estimate.objects and failure.stage != "grasp" and not supported:
         poses = nearest_rests(estimate.objects[name])
-        yield from primitives.move_to(planner, Step("move_to", name, poses=poses))
+        try:
+            yield from primitives.move_to(planner, Step("move_to", name, poses=poses))
+        except StageFailure:
+            if not among_others:
+                raise
+            yield from _set_down_in_clutter(primitives, planner, name)
     yield from primitives.release(planner, name)
+
+
+def _set_down_in_clutter(primitives: Primitives, planner: MotionPlanner, name: str) -> Actions:
+    """Where there is room for what is held; without any, as low as it can be lowered from where it is."""
+    estimate = primitives.observe()
+    poses = places_aside(estimate.objects[name], (), estimate, planner.within(estimate.scene))
+    try:
+        if poses:
+            yield from primitives.move_to(planner, Step("move_to", name, poses=poses))
+            return
+    except StageFailure as failure:
+        if failure.stage == "grasp":
+            return
+    yield from primitives.lower(planner, name)
 
 
 def nearest_rests(obj: ObjectEstimate) -> Poses:

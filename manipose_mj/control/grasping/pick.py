@@ -38,7 +38,7 @@ _MAX_TRIES = 12
 # What can be lifted so far has room around it: a path is taken for granted before it is needed [m].
 _ROOMY = 0.05
 # The approach may brush nothing, but the open fingers pass the object closely.
-_APPROACH = replace(CONTACT, arm=0.002, target=0.0)
+APPROACH = replace(CONTACT, arm=0.002, target=0.0)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _free_of_collision(
 ) -> Reach:
     kept = []
     for k, index in enumerate(reach.index):
-        query = CollisionQuery(_APPROACH, opening=float(grasps.openings[index]), target=target)
+        query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
         if not planner.collides(reach.joints[k], query):
             kept.append(k)
     return Reach(reach.index[kept], reach.joints[kept])
@@ -246,7 +246,7 @@ def _approach(
     target: np.ndarray,
 ) -> Float[np.ndarray, "s 7"] | None:
     """Joint targets of a straight approach to the grasp; None if there is none."""
-    query = CollisionQuery(_APPROACH, opening=float(grasps.openings[index]), target=target)
+    query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
     for standoff in _STANDOFFS:
         back = planner.line(joints, planner.backed_off(joints, standoff), query)
         if back is not None:

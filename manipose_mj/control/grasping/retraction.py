@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from manipose_mj.control.grasping.candidates import reachable
 from manipose_mj.control.grasping.retreat import RETREATS
@@ -28,6 +28,9 @@ _INSIDE = 0.003
 _PULLS = (0.16, 0.09)
 _SIDEWAYS = 0.8
 _MAX_PLACES = 8
+_MAX_OTHERS = 12  # destinations looked at beyond those of the nearest places
+# How far what finds no place is lowered, best first [m].
+_LOWERINGS = tuple(float(d) for d in np.arange(0.16, 0.005, -0.01))
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,25 @@ def find_place(
     extra = np.broadcast_to(near, (len(tcp_poses), 7))
     reach = reachable(tcp_poses, near, extra_seeds=extra)
     order = np.argsort(np.abs(reach.joints - near).sum(axis=1), kind="stable")
-    for k in order[:_MAX_PLACES]:
+    owner = reach.index // (len(tcp_poses) // len(label_poses))
+    for k in [*order[:_MAX_PLACES], *_of_each_other(owner, order)]:
         place = _lowered(planner, reach.joints[k], attached, way_out)
         if place is not None:
             return place
     return None
+
+
+def _of_each_other(
+    owner: Int[np.ndarray, "k"], order: Int[np.ndarray, "k"]
+) -> list[Int[np.ndarray, ""]]:
+    """The first in order of each destination that is not among the first few."""
+    seen = {int(owner[k]) for k in order[:_MAX_PLACES]}
+    found = []
+    for k in order[_MAX_PLACES:]:
+        if int(owner[k]) not in seen:
+            seen.add(int(owner[k]))
+            found.append(k)
+    return found[:_MAX_OTHERS]
 
 
 def _lowered(
@@ -131,6 +148,19 @@ def _retracted(
     clearance = replace(CONTACT, attached=_INSIDE)
     exit_ = planner.line(retraction[-1], above, attached.query(clearance), off_support=False)
     return None if exit_ is None else np.concatenate([retraction, exit_])
+
+
+def lowering(
+    planner: MotionPlanner, joints: Float[np.ndarray, "7"], attached: AttachedObject
+) -> Float[np.ndarray, "t 7"] | None:
+    """Joint targets straight down, as far as what is held meets nothing; None if that is nowhere."""
+    for depth in _LOWERINGS:
+        below = planner.tcp_pose(joints)
+        below[2, 3] -= depth
+        line = planner.line(joints, below, attached.query(CONTACT), off_support=False)
+        if line is not None:
+            return line
+    return None
 
 
 def transport_path(

@@ -24,7 +24,7 @@ def retreat(
     touched: frozenset[str],
     distances: Sequence[float] = RETREATS,
 ) -> Float[np.ndarray, "t 7"] | None:
-    """Joint targets straight back, to where the next motion has room if there is such a place.
+    """Joint targets straight back, or else up, to where the next motion has room if there is such a place.
 
     Args:
       planner: Plans in the scene of `estimate`.
@@ -34,11 +34,15 @@ def retreat(
       distances: To try, the best first [m].
     """
     query = CollisionQuery(replace(CONTACT, arm=0.0), target=released)
-    found = None
-    for distance in distances:
-        back = planner.backed_off(estimate.joints, distance)
-        line = planner.line(estimate.joints, back, query, touched=touched)
-        if line is not None and not planner.collides(line[-1], CollisionQuery(TRANSIT)):
-            return line
-        found = line if found is None else found
-    return found
+    back = (planner.backed_off(estimate.joints, distance) for distance in distances)
+    up = (planner.raised(estimate.joints, distance) for distance in distances)
+    for ways in (back, up):
+        found = None
+        for way in ways:
+            line = planner.line(estimate.joints, way, query, touched=touched)
+            if line is not None and not planner.collides(line[-1], CollisionQuery(TRANSIT)):
+                return line
+            found = line if found is None else found
+        if found is not None:
+            return found
+    return None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.free_motion import plan_path
@@ -70,6 +70,12 @@ class MotionPlanner:
         pose[:3, 3] -= distance * pose[:3, 2]
         return pose
 
+    def raised(self, joints: Float[np.ndarray, "7"], distance: float) -> Float[np.ndarray, "4 4"]:
+        """The TCP's pose after going straight up [m]."""
+        pose = self.tcp_pose(joints)
+        pose[2, 3] += distance
+        return pose
+
     def body_name(self, body: int) -> str:
         """The name of a body of the scene."""
         return self.scene.model.body(body).name
@@ -77,6 +83,12 @@ class MotionPlanner:
     def collides(self, joints: Float[np.ndarray, "7"], query: CollisionQuery) -> bool:
         """Whether the arm, with what is attached, is too close to anything."""
         return self.scene.in_collision(joints, self._allowing(query))
+
+    def obstacles(
+        self, joints: Float[np.ndarray, "7"], query: CollisionQuery
+    ) -> Bool[np.ndarray, "ngeom"]:
+        """Mask of the geoms that the arm, with what is attached, is too close to."""
+        return self.scene.obstacles(joints, self._allowing(query))
 
     def free_path(
         self,

@@ -74,7 +74,7 @@ class Step:
 
     Attributes:
       primitive: `grasp_at` takes hold of the subject, `move_to` brings the held subject to one of
-        `poses` or to `opening`, `release` lets go of it and backs off.
+        `poses` or to `opening`, `release` lets go of it and backs off. While nothing is held, `move_to` pushes.
       subject: Name of an object or of a moving part.
       poses: `T_world_label` for an object that is moved; any of them will do.
       opening: Joint position for a part that is moved [m or rad].

@@ -90,6 +90,23 @@ class PlanningScene:
         names = [self.model.geom(int(g)).name or f"geom {g}" for g in contacts.geoms[i]]
         return names[0], names[1], float(contacts.distances[i])
 
+    def obstacles(
+        self, joints: Float[np.ndarray, "7"], query: CollisionQuery
+    ) -> Bool[np.ndarray, "ngeom"]:
+        """Mask of all geoms that the robot or what is attached comes too close to.
+
+        The robot's own among them where two of its links meet.
+        """
+        contacts = self.collision_model.contacts(self.positions, joints, query)
+        bad = contacts.geoms[contacts.distances < self._allowed(contacts, query)]
+        moving = self.robot if query.attached is None else self.robot | query.attached.geoms
+        hit = np.zeros(len(self.robot), bool)
+        for first, second in bad.reshape(-1, 2):
+            both = moving[first] and moving[second]
+            hit[first] |= both or not moving[first]
+            hit[second] |= both or not moving[second]
+        return hit
+
     def touching(
         self, geoms: Bool[np.ndarray, "ngeom"], distance: float
     ) -> list[tuple[int, float]]:

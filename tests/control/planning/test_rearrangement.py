@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.planning.obstructions import blockers_of
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter, is_supported
+from manipose_mj.control.planning.set_aside import places_aside, radius
 from manipose_mj.control.planning.table_places import is_free
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import episode
@@ -54,14 +58,42 @@ def test_other_moves_are_tried_before_it_gives_up(stacked):
     environment, perception, planner = stacked
     estimate = perception.observe()
     candidates = candidate_moves(environment.task.goals, estimate, planner)
-    first, second = next(candidates), next(candidates)
-    assert first.steps()[0].subject != second.steps()[0].subject
-    assert 0 < first.contact_allowance == second.contact_allowance
     seen = []
-    with pytest.raises(InputError, match="none of .* can be moved"):
+    with pytest.raises(InputError, match="nothing can be moved any more"):
         for move in candidates:
-            seen.append(move.contact_allowance)
-    assert seen == sorted(seen) and len(set(seen)) == 3 and len(seen) % 3 == 1
+            seen.append((move.steps()[0].subject, move.contact_allowance))
+    subjects = [subject for subject, _ in seen]
+    assert len(set(subjects)) > 2 and "object" in subjects[1:]
+    assert {allowance for _, allowance in seen} == {0.001, 0.006, 0.012}
+    assert len(seen) <= 3 * (len(estimate.objects) + 5)
+
+
+def test_what_blocks_a_target_is_what_lies_on_it_and_without_that_it_is_free(stacked):
+    _, perception, planner = stacked
+    estimate = perception.observe()
+    target = estimate.objects["object"]
+    sets = blockers_of(target, estimate, planner.allowing(0.001))
+    assert sets and all(sets)
+    far = compose(np.eye(3), np.array([0.0, 0.0, 3.0]))
+    scene = estimate.scene
+    for name in sets[0]:
+        obj = estimate.objects[name]
+        scene = scene.with_body_at(obj.body, far @ obj.pose)
+    emptied = replace(estimate, scene=scene)
+    assert frozenset() in blockers_of(target, emptied, planner.within(scene).allowing(0.001))
+
+
+def test_places_aside_keep_off_goals_also_where_the_table_is_full(stacked):
+    environment, perception, planner = stacked
+    estimate = perception.observe()
+    goal = _target_goal(environment.task)
+    for name, obj in estimate.objects.items():
+        poses = places_aside(obj, [goal], estimate, planner)
+        assert poses and name
+        for pose in poses:
+            assert is_free(planner, obj, pose)
+            size = radius(obj) + radius(estimate.objects[goal.object])
+            assert np.linalg.norm(pose[:2, 3] - goal.pose[:2, 3]) > size - 0.021
 
 
 def test_the_stack_supports_its_top_and_thin_air_does_not(stacked):
