@@ -13,6 +13,8 @@ from asset_pipeline.labelling.mirror_label import mirror_label
 from asset_pipeline.labelling.print_symmetry import surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.tool_label import tool_label
+from asset_pipeline.labelling.vessel_label import vessel_label
+from asset_pipeline.labelling.vessel_shape import vessel_shape
 from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
@@ -58,6 +60,9 @@ def scan_label(
     if up is None:
         raise InputError(f"no up axis for an object of type {object_type!r}; only tools need none")
     up = np.asarray(up, float) / np.linalg.norm(up)
+    vessel = vessel_shape(cloud, up)
+    if vessel is not None and vessel.parts:
+        return vessel_label(cloud, vessel)
     if object_type == "axial":
         colours = None if texture is None else surface_colours(cloud, mesh, texture)
         found = axial_label(cloud, up, textured=textured, colours=colours)
