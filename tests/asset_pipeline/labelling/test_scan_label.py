@@ -120,9 +120,11 @@ def test_ends_are_alike_only_where_the_print_is(tmp_path: Path, striped: bool):
     texture = tmp_path / "texture.png"
     Image.fromarray(image).save(texture)
     label, _ = scan_label(tin, "axial", UP, textured=True, texture=texture)
-    assert len(label.symmetry.rotations) == (1 if striped else 2)
+    assert len(label.symmetry.rotations) == 2
+    assert len(label.symmetry_textured.rotations) == (1 if striped else 2)
+    assert label.symmetry_textured.axial
     unread, _ = scan_label(tin, "axial", UP, textured=True)
-    assert len(unread.symmetry.rotations) == 1
+    assert len(unread.symmetry.rotations) == 2 and len(unread.symmetry_textured.rotations) == 1
 
 
 def test_bad_questions_are_refused():
