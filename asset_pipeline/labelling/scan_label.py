@@ -41,8 +41,8 @@ def scan_label(
       object_type: `"axial"`, `"mirror"` or `"functional"`.
       up: `(3,)`, in the mesh frame, to within about 10 degrees; None only for functional objects,
         which do not need it.
-      category: What kind of object it is; tells which end of a tool is held. Unknown ones get the
-        rule of `tool_label`.
+      category: What kind of object it is; tells which end of a tool is held, and which slabs keep X
+        up. Unknown tools get the rule of `tool_label`.
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
       textured: Whether the asset has a texture, which may break symmetries of the shape.
       texture: Its image, to measure which; without, it is taken to leave turns about an axis only.
@@ -60,7 +60,7 @@ def scan_label(
     if up is None or object_type == "functional":
         label, quality = tool_label(cloud, category=category, functional=functional)
     else:
-        label, quality = _upright_label(cloud, object_type, np.asarray(up, float))
+        label, quality = _upright_label(cloud, object_type, np.asarray(up, float), category)
     if textured:
         colours = None if texture is None else surface_colours(cloud, mesh, texture)
         label = replace(label, print_symmetry=print_symmetry(cloud, colours, label))
@@ -68,7 +68,7 @@ def scan_label(
 
 
 def _upright_label(
-    cloud: SurfaceCloud, object_type: ObjectType, up: Float[np.ndarray, "3"]
+    cloud: SurfaceCloud, object_type: ObjectType, up: Float[np.ndarray, "3"], category: str
 ) -> tuple[PoseLabel, LabelQuality]:
     up = up / np.linalg.norm(up)
     vessel = vessel_shape(cloud, up)
@@ -78,4 +78,4 @@ def _upright_label(
         found = axial_label(cloud, up)
         if found is not None:
             return found
-    return mirror_label(cloud, up, object_type=object_type)
+    return mirror_label(cloud, up, object_type=object_type, category=category)
