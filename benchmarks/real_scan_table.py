@@ -20,7 +20,7 @@ import json
 import logging
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +51,8 @@ class Row:
     """One scan.
 
     Attributes: scan; category; network, the weights' name; in_catalogue, whether training had the kind;
-    n views; origin and orientation errors [cm, deg], of mugs also as NOCS counts; flipped, a share;
+    n views; origin and orientation errors [cm, deg], of mugs also as NOCS counts, and up to the symmetry of
+    shape and print (textured); flipped, a share;
     the means [cm, deg] that are the bar.
     """
 
@@ -65,6 +66,7 @@ class Row:
     deg_mean: float
     deg_median: float
     nocs_deg_mean: float
+    textured_deg_mean: float
     flipped: float
     bar_cm: float
     bar_deg: float
@@ -146,7 +148,8 @@ def row_of(asset: Asset, network: str, errors: PoseErrors) -> Row:
     """The table's row of one scan."""
     figures = summary(errors)
     kind, known = asset.label.object_type, CATALOGUE.get(asset.category)
-    names = ("n", "origin_cm_mean", "origin_cm_median", "deg_mean", "deg_median", "nocs_deg_mean")
+    names = ("n", "origin_cm_mean", "origin_cm_median", "deg_mean", "deg_median")
+    names += ("nocs_deg_mean", "textured_deg_mean")
     bar_cm, bar_deg = bar_of(asset.category, kind)
     return Row(
         asset.name,
@@ -163,7 +166,17 @@ def row_of(asset: Asset, network: str, errors: PoseErrors) -> Row:
 def table_of(rows: Sequence[Row], setting: str) -> Table:
     """The rows as people read them; what the catalogue does not have is in brackets."""
     table = Table("scan", "category", "network", title=f"real scans, {setting}")
-    for head in ("n", "cm", "median", "deg", "median", "flipped", "paper: cm / deg", "within"):
+    for head in (
+        "n",
+        "cm",
+        "median",
+        "deg",
+        "median",
+        "with print",
+        "flipped",
+        "paper: cm / deg",
+        "within",
+    ):
         table.add_column(head, justify="right")
     for row in rows:
         table.add_row(
@@ -176,6 +189,7 @@ def table_of(rows: Sequence[Row], setting: str) -> Table:
             f"{row.deg_mean:.1f}"
             + (f" ({row.nocs_deg_mean:.1f})" if row.category == "mug" else ""),
             f"{row.deg_median:.1f}",
+            f"{row.textured_deg_mean:.1f}",
             f"{row.flipped:.0%}",
             f"{row.bar_cm:.2f} / {row.bar_deg:.1f}",
             "yes" if row.within else "no",
@@ -233,14 +247,18 @@ def measured(
         seen = views_of(asset, setting, options.views)
         found = predict(chosen[1], seen, timed=0)
         group = kind_symmetry(asset)
-        errors = pose_errors(found.poses, [replace(cloud, symmetry=group) for cloud in seen])
+        errors = pose_errors(
+            found.poses,
+            [replace(cloud, symmetry=group) for cloud in seen],
+            textured={asset.name: asset.label.symmetry_textured},
+        )
         rows.append(row_of(asset, chosen[0], errors))
         clouds += seen
         poses.append(found.poses)
         parts.append(errors)
     if not rows:
         raise InputError("no weights for any of these scans; give --weights DIR")
-    columns = ("origin", "rotation", "nocs_rotation", "mssd")
+    columns = (field.name for field in fields(PoseErrors))
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in columns)
     return rows, clouds, np.concatenate(poses), PoseErrors(*joined)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.labelling.print_symmetry import print_differs
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.surface_symmetry import (
     ROUND,
@@ -16,7 +15,6 @@ from asset_pipeline.labelling.surface_symmetry import (
 from asset_pipeline.labelling.symmetry_fit import half_turn_axis
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality, fits
-from manipose_mj.poses import SymmetryGroup
 
 MAX_LEAN = np.deg2rad(13.0)  # of a source's up from the axis
 
@@ -24,9 +22,6 @@ MAX_LEAN = np.deg2rad(13.0)  # of a source's up from the axis
 def axial_label(
     cloud: SurfaceCloud,
     up: Float[np.ndarray, "3"],
-    *,
-    textured: bool,
-    colours: Float[np.ndarray, "n 3"] | None = None,
 ) -> tuple[PoseLabel, LabelQuality] | None:
     """The frame of a surface of revolution, or None where it is not one.
 
@@ -37,8 +32,6 @@ def axial_label(
     Args:
       cloud: The surface.
       up: `(3,)`, unit, in the mesh frame.
-      textured: Whether it has a print, which is taken to tell the ends apart: no flips then.
-      colours: Of the cloud's points, to measure whether it does.
     """
     axis, point = half_turn_axis(cloud, up, cloud.points.mean(axis=0))
     axis = axis if axis @ up > 0 else -axis
@@ -55,9 +48,6 @@ def axial_label(
     symmetry = measured_symmetry(cloud, rotation, origin, axial=ROUND)
     turned = rotation @ np.diag([-1.0, 1.0, -1.0]) @ rotation.T
     flip = residual(cloud, turned, origin)
-    printed = textured and (colours is None or print_differs(cloud, colours, turned, origin))
-    if printed:
-        symmetry = SymmetryGroup.about_x()
     label = PoseLabel(origin, rotation, "axial", high - low, symmetry)
     residuals = {"axis": axial_residual(cloud, axis, origin), "flip": flip}
     quality = LabelQuality(fits(around, limit), residuals)

@@ -10,7 +10,9 @@ from jaxtyping import Float
 from PIL import Image
 
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
-from asset_pipeline.labelling.surface_symmetry import PROBES
+from asset_pipeline.labelling.surface_symmetry import GENERIC_TURNS, PROBES
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.poses import SymmetryGroup, rotation_about
 
 # Mean difference of colours, per channel from 0 to 1, that light and wear explain.
 SAME_COLOUR = 0.06
@@ -37,6 +39,37 @@ def surface_colours(
     column = np.clip((at[:, 0] % 1) * width, 0, width - 1).astype(int)
     row = np.clip((1 - at[:, 1] % 1) * height, 0, height - 1).astype(int)
     return pixels[row, column]
+
+
+def print_symmetry(
+    cloud: SurfaceCloud, colours: Float[np.ndarray, "n 3"] | None, label: PoseLabel
+) -> SymmetryGroup:
+    """Of the shape's symmetries those that leave its print unchanged, a group.
+
+    Where not every turn about an axis of revolution does, half and quarter turns about it are tried.
+
+    Args:
+      cloud: The surface.
+      colours: Of its points; None for a print that cannot be read, which is taken to leave alike
+        nothing but the turns about an axis of revolution.
+      label: With the shape's symmetry.
+    """
+    shape = label.symmetry
+    if colours is None:
+        return SymmetryGroup.about_x() if shape.axial else SymmetryGroup.identity()
+
+    def kept(turn: np.ndarray) -> bool:
+        motion = label.rotation @ turn @ label.rotation.T
+        return not print_differs(cloud, colours, motion, label.origin)
+
+    axis = np.array([1.0, 0.0, 0.0])
+    tried = list(shape.rotations[1:])
+    axial = bool(shape.axial) and all(kept(rotation_about(axis, t)) for t in GENERIC_TURNS)
+    if shape.axial and not axial:
+        tried = [np.round(rotation_about(axis, t)) for t in (np.pi / 2, np.pi)]
+    members = [turn for turn in tried if kept(turn)]
+    group = SymmetryGroup.generated(np.stack(members)) if members else SymmetryGroup.identity()
+    return SymmetryGroup(group.rotations, axial=axial)
 
 
 def print_differs(

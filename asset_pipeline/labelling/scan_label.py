@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ from jaxtyping import Float
 
 from asset_pipeline.labelling.axial_label import axial_label
 from asset_pipeline.labelling.mirror_label import mirror_label
-from asset_pipeline.labelling.print_symmetry import surface_colours
+from asset_pipeline.labelling.print_symmetry import print_symmetry, surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.tool_label import tool_label
+from asset_pipeline.labelling.vessel_label import vessel_label
+from asset_pipeline.labelling.vessel_shape import vessel_shape
 from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
@@ -38,12 +41,11 @@ def scan_label(
       object_type: `"axial"`, `"mirror"` or `"functional"`.
       up: `(3,)`, in the mesh frame, to within about 10 degrees; None only for functional objects,
         which do not need it.
-      category: What kind of object it is; tells which end of a tool is held. Unknown ones get the
-        rule of `tool_label`.
+      category: What kind of object it is; tells which end of a tool is held, and which slabs keep X
+        up. Unknown tools get the rule of `tool_label`.
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
-      textured: Whether the asset has a texture, which is taken to tell the ends of an axial object
-        apart.
-      texture: Its image, to measure whether it does.
+      textured: Whether the asset has a texture, which may break symmetries of the shape.
+      texture: Its image, to measure which; without, it is taken to leave turns about an axis only.
 
     Raises:
       InputError: Another object type, which scans do not have, or no `up` where it is needed.
@@ -52,15 +54,28 @@ def scan_label(
         raise InputError(
             f"object type {object_type!r} of a scan; expected axial, mirror or functional"
         )
-    cloud = SurfaceCloud.of(mesh)
-    if object_type == "functional":
-        return tool_label(cloud, category=category, functional=functional)
-    if up is None:
+    if up is None and object_type != "functional":
         raise InputError(f"no up axis for an object of type {object_type!r}; only tools need none")
-    up = np.asarray(up, float) / np.linalg.norm(up)
-    if object_type == "axial":
+    cloud = SurfaceCloud.of(mesh)
+    if up is None or object_type == "functional":
+        label, quality = tool_label(cloud, category=category, functional=functional)
+    else:
+        label, quality = _upright_label(cloud, object_type, np.asarray(up, float), category)
+    if textured:
         colours = None if texture is None else surface_colours(cloud, mesh, texture)
-        found = axial_label(cloud, up, textured=textured, colours=colours)
+        label = replace(label, print_symmetry=print_symmetry(cloud, colours, label))
+    return label, quality
+
+
+def _upright_label(
+    cloud: SurfaceCloud, object_type: ObjectType, up: Float[np.ndarray, "3"], category: str
+) -> tuple[PoseLabel, LabelQuality]:
+    up = up / np.linalg.norm(up)
+    vessel = vessel_shape(cloud, up)
+    if vessel is not None and vessel.parts:
+        return vessel_label(cloud, vessel)
+    if object_type == "axial":
+        found = axial_label(cloud, up)
         if found is not None:
             return found
-    return mirror_label(cloud, up, object_type=object_type)
+    return mirror_label(cloud, up, object_type=object_type, category=category)

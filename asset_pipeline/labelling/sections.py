@@ -12,7 +12,9 @@ from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 
 SLICES = 140
 TRIM = 2.0  # percentile of points left out at each side of a slice
-FLOOR = 0.002  # added to widths before they are compared as ratios: noise is half a millimetre [m]
+# Of the length, added to widths before they are compared as ratios: noise is half a millimetre. A length of its
+# own would move the joint of a small tool against that of a large one of the same shape.
+FLOOR = 0.01
 WINDOW = 0.045  # of the length, on each side of a change
 # It has begun when it is this large for each width, or `begun` of the whole step.
 DEPARTURE = 0.04
@@ -87,6 +89,7 @@ def joint(
     At every place the mean logarithms of thickness and width on either side are compared. A peak of
     their change above `step` (the first, or the largest) is a step; it begins where the section departs
     from that before it, towards that after it, by `DEPARTURE`, or by `begun` of the step where that is more.
+    The place is at the same share of the length in similar tools of any size.
 
     Args:
       sections: From the grip's end.
@@ -99,7 +102,7 @@ def joint(
     Returns:
       The place along the axis [m], and the step's size.
     """
-    logs = np.log(np.stack([sections.thickness, sections.width]) + FLOOR)
+    logs = np.log(np.stack([sections.thickness, sections.width]) + FLOOR * sections.length)
     if thickness_only:
         logs = logs[[int(np.percentile(logs, 90, axis=1).argmin())]]
     window = max(3, round(WINDOW * SLICES))

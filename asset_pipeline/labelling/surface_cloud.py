@@ -76,3 +76,11 @@ class SurfaceCloud:
     def thinned(self, count: int) -> slice:
         """Every so many points, `count` of them or a few more."""
         return slice(None, None, max(1, len(self.points) // count))
+
+    def box(
+        self, rotation: Float[np.ndarray, "3 3"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Centre, in the mesh frame, and lengths of the box around the surface along the columns [m]."""
+        local = self.points @ rotation
+        low, high = local.min(axis=0), local.max(axis=0)
+        return rotation @ ((low + high) / 2), high - low

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from manipose_mj.poses import SymmetryGroup, rotation_about
@@ -43,14 +43,18 @@ WORN = Tolerance(percentile=95.0, length=0.0016, share=0.025)
 
 
 def residuals(
-    cloud: SurfaceCloud, motion: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"]
+    cloud: SurfaceCloud,
+    motion: Float[np.ndarray, "3 3"],
+    center: Float[np.ndarray, "3"],
+    chosen: Int[np.ndarray, "n"] | None = None,
 ) -> Float[np.ndarray, "n"]:
-    """Distance [m] of moved points from the surface, `PROBES` of them or a few more.
+    """Distance [m] of moved points from the surface: of `chosen`, or of `PROBES` points or a few more.
 
     `motion` is a rotation or a reflection about `center`, in the mesh frame. The distance is to the
     tangent plane of the nearest point that faces the same way, so that the spacing does not count.
     """
-    chosen = cloud.thinned(PROBES)
+    if chosen is None:
+        chosen = np.arange(len(cloud.points))[cloud.thinned(PROBES)]
     moved = (cloud.points[chosen] - center) @ motion.T + center
     facing = cloud.normals[chosen] @ motion.T
     distance, near = cloud.tree.query(moved, CANDIDATES)

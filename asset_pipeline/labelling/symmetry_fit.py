@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from manipose_mj.poses import rotation_about
@@ -60,11 +60,18 @@ def refined_plane(
 
 
 def half_turn_axis(
-    cloud: SurfaceCloud, axis: Float[np.ndarray, "3"], point: Float[np.ndarray, "3"]
+    cloud: SurfaceCloud,
+    axis: Float[np.ndarray, "3"],
+    point: Float[np.ndarray, "3"],
+    chosen: Int[np.ndarray, "k"] | None = None,
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """The axis near `axis` about which half a turn maps the surface onto itself best, and its point."""
+    """The axis near `axis` about which half a turn maps the surface onto itself best, and its point.
+
+    Only the `chosen` points of the surface are turned, where they are given.
+    """
+    turned = cloud.points if chosen is None else cloud.points[chosen]
     for count, steps, width in ((COARSE, 2 * COARSE_STEPS, WIDE), (FINE, FINE_STEPS, NARROW)):
-        points, scale = cloud.points[cloud.thinned(count)], cloud.diagonal / 2
+        points, scale = turned[:: max(1, len(turned) // count)], cloud.diagonal / 2
         for step in range(steps):
             offsets = points - point
             along = offsets @ axis
@@ -81,6 +88,34 @@ def half_turn_axis(
             axis = axis / np.linalg.norm(axis)
             point = point + across @ move[2:]
     return axis, point
+
+
+def plane_through_axis(
+    cloud: SurfaceCloud,
+    chosen: Int[np.ndarray, "k"],
+    axis: Float[np.ndarray, "3"],
+    point: Float[np.ndarray, "3"],
+    normal: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, "3"]:
+    """The normal of the plane through an axis that maps some of the points onto the surface best.
+
+    Args:
+      cloud: The surface.
+      chosen: Which points are reflected.
+      axis: `(3,)`, unit; `point`, `(3,)` [m], on it.
+      point: See `axis`.
+      normal: `(3,)`, unit, square to the axis: where the fit starts.
+    """
+    offsets = cloud.points[chosen] - point
+    for step in range(FINE_STEPS):
+        height, along = offsets @ normal, np.cross(axis, normal)
+        moved = point + offsets - 2 * height[:, None] * normal
+        gap, normals, weight = _gap(cloud, moved, max(WIDE / 2 ** (step / 2), 2 * NARROW))
+        rows = -2 * ((offsets @ along) * (normals @ normal) + height * (normals @ along))
+        turn = float((weight * rows) @ gap / max(float((weight * rows) @ rows), 1e-12))
+        normal = normal + turn * along
+        normal = normal / np.linalg.norm(normal)
+    return normal
 
 
 def around(

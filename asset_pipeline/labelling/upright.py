@@ -13,6 +13,9 @@ MAX_LEAN = np.deg2rad(13.0)  # of a source's up from the object's own
 STEP, FINE = np.deg2rad(0.5), np.deg2rad(0.1)
 LEVEL = np.deg2rad(3.0)  # a surface is level or upright to within
 CLEAR_LEVEL = 0.03  # of the surface, more than at the median tilt
+LEVEL_AT_REST = (
+    0.5  # of what is level at the best tilt, to be so at rest; else one of them is wrong
+)
 REFINEMENTS = 3
 CLEAR_RISE = 0.001  # of the length, by which the centroid rises when it is rolled by a degree
 CONTACT = 0.0015  # what is so near the floor stands on it [m]
@@ -28,7 +31,8 @@ def upright(
 
     Seen along the mirror plane's normal, it is one of the tilts at which the object can rest: the one at
     which most of the surface is level or upright (a camera could also rest on its lens). Where it
-    rests at none (a ball of a handle, a tool), what is level decides alone.
+    rests at none (a ball of a handle, a tool), or hardly, with far less level than at another tilt (a
+    camera on the edge of its base and its lens), what is level decides alone.
 
     Args:
       cloud: The surface.
@@ -49,6 +53,12 @@ def upright(
     if not rests:
         return levelled, clear
     axis, rise = max(rests, key=lambda rest: float(_level(cloud, rest[0], normal)[1].mean()))
+    firm = float(np.clip(rise / CLEAR_RISE - 1, 0.0, 1.0))
+    if levelled @ axis < np.cos(2 * NEAR):
+        share = float(_level(cloud, axis, normal)[1].mean() / level.max())
+        if clear == 1 and firm < 1 and share < LEVEL_AT_REST:
+            return levelled, 1.0
+        clear = firm = min(share / LEVEL_AT_REST, 1.0)
     near = np.arange(-NEAR, NEAR + STEP / 2, STEP)
     around = [rotation_about(normal, float(angle)) @ axis for angle in near]
     standing, width = _standing(cloud, around, normal)
@@ -56,7 +66,7 @@ def upright(
         axis = standing
     elif clear == 1 and levelled @ axis > np.cos(NEAR):
         axis = levelled
-    return axis, max(clear, float(np.clip(rise / CLEAR_RISE - 1, 0.0, 1.0)))
+    return axis, max(clear, firm)
 
 
 def _level(

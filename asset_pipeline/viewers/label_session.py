@@ -109,7 +109,7 @@ class LabelSession:
         """Say what group the shape has: a key of `SYMMETRIES`."""
         if name not in SYMMETRIES:
             raise unknown_name("symmetry", name, SYMMETRIES)
-        self.label = replace(self.label, symmetry=SYMMETRIES[name])
+        self.label = replace(self.label, symmetry=SYMMETRIES[name], print_symmetry=None)
 
     @property
     def shown(self) -> Asset:

@@ -24,6 +24,7 @@ class PoseLabel:
       object_type: Which rule of the conventions fixed the axes.
       extents: `(3,)` [m], lengths of the bounding box along X, Y, Z.
       symmetry: Proper rotations, in the label frame, that leave the shape unchanged.
+      print_symmetry: Those of them that leave the print unchanged as well, where it breaks some.
     """
 
     origin: Float[np.ndarray, "3"]
@@ -31,6 +32,12 @@ class PoseLabel:
     object_type: ObjectType
     extents: Float[np.ndarray, "3"]
     symmetry: SymmetryGroup
+    print_symmetry: SymmetryGroup | None = None
+
+    @property
+    def symmetry_textured(self) -> SymmetryGroup:
+        """The rotations that leave shape and print unchanged."""
+        return self.symmetry if self.print_symmetry is None else self.print_symmetry
 
     @property
     def pose(self) -> Float[np.ndarray, "4 4"]:
@@ -38,18 +45,22 @@ class PoseLabel:
         return compose(self.rotation, self.origin)
 
 
-def symmetry_to_bop(label: PoseLabel) -> dict[str, Any]:
+def symmetry_to_bop(label: PoseLabel, group: SymmetryGroup) -> dict[str, Any]:
     """`symmetries_discrete` and `symmetries_continuous` in the mesh frame, as in BOP's models_info.
 
     BOP's discrete list leaves the identity out; matrices are row-major 4x4.
+
+    Args:
+      label: Whose frame the group is in.
+      group: The label's `symmetry` or `symmetry_textured`.
     """
     discrete = []
-    for turn in label.symmetry.rotations[1:]:
+    for turn in group.rotations[1:]:
         rotation = label.rotation @ turn @ label.rotation.T
         matrix = compose(rotation, label.origin - rotation @ label.origin)
         discrete.append([float(v) for v in matrix.ravel()])
     continuous = []
-    if label.symmetry.axial:
+    if group.axial:
         continuous.append(
             {
                 "axis": [float(v) for v in label.rotation[:, 0]],

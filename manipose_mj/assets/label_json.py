@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from manipose_mj.assets.json_fields import Fields, rounded
 from manipose_mj.assets.label import (
@@ -15,6 +16,9 @@ from manipose_mj.assets.label import (
 )
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup
+
+TEXTURED = "textured"  # ends the fields of the group that shape and print have
 
 
 def label_to_json(label: PoseLabel) -> dict[str, Any]:
@@ -24,7 +28,11 @@ def label_to_json(label: PoseLabel) -> dict[str, Any]:
         "origin": rounded(label.origin),
         "rotation": rounded(label.rotation),
         "extents": rounded(label.extents),
-        **symmetry_to_bop(label),
+        **symmetry_to_bop(label, label.symmetry),
+        **{
+            f"{name}_{TEXTURED}": entries
+            for name, entries in symmetry_to_bop(label, label.symmetry_textured).items()
+        },
     }
 
 
@@ -37,21 +45,31 @@ def read_label(fields: Fields) -> PoseLabel:
     rotation = fields.array("rotation", 3, 3)
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
         raise fields.wrong("rotation", "a right-handed rotation matrix")
-    discrete = fields.entries("symmetries_discrete")
-    continuous = fields.entries("symmetries_continuous")
-    try:
-        symmetry = symmetry_from_bop(rotation, discrete, continuous)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{fields.path}: field '{fields.name}.symmetries_*' is wrong: {error}"
-        ) from None
+    symmetry, printed = _group(fields, rotation, ""), _group(fields, rotation, f"_{TEXTURED}")
+    if len(printed.rotations) > len(symmetry.rotations) or printed.axial > symmetry.axial:
+        raise fields.wrong(
+            f"symmetries_discrete_{TEXTURED}", "rotations that leave the shape unchanged as well"
+        )
+    same = len(printed.rotations) == len(symmetry.rotations) and printed.axial == symmetry.axial
     return PoseLabel(
         origin=fields.array("origin", 3),
         rotation=rotation,
         object_type=fields.text("object_type", *OBJECT_TYPES),
         extents=fields.lengths("extents"),
         symmetry=symmetry,
+        print_symmetry=None if same else printed,
     )
+
+
+def _group(fields: Fields, rotation: Float[np.ndarray, "3 3"], ending: str) -> SymmetryGroup:
+    discrete = fields.entries(f"symmetries_discrete{ending}")
+    continuous = fields.entries(f"symmetries_continuous{ending}")
+    try:
+        return symmetry_from_bop(rotation, discrete, continuous)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{fields.path}: field '{fields.name}.symmetries_*{ending}' is wrong: {error}"
+        ) from None
 
 
 def quality_to_json(quality: LabelQuality | None) -> dict[str, Any] | None:

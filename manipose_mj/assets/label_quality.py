@@ -16,7 +16,7 @@ class LabelQuality:
         the evidence for each decision (plane, sign, joint ...), not a probability.
       residuals: By what was tried (`"axis"`: every turn about X; `"plane"`; `"second_plane"`;
         `"half_turn"`: about X; `"flip"`: about Y), the 95th percentile of the distance of the moved
-        surface from itself [m].
+        surface from itself [m]; `"parts"`: the 90th over handles alone under the mirror plane.
     """
 
     confidence: float

@@ -150,7 +150,7 @@ def test_the_model_loads_alone_from_a_moved_folder_with_the_mass_that_is_said(tm
 )
 def test_symmetries_survive_the_bop_form(group):
     label = _label(group)
-    stored = json.loads(json.dumps(symmetry_to_bop(label)))
+    stored = json.loads(json.dumps(symmetry_to_bop(label, group)))
     assert len(stored["symmetries_discrete"]) == len(group.rotations) - 1
     for matrix in stored["symmetries_discrete"]:  # BOP's matrices map the mesh onto itself
         turned = np.reshape(matrix, (4, 4)) @ [*label.origin, 1.0]
@@ -158,6 +158,17 @@ def test_symmetries_survive_the_bop_form(group):
     back = symmetry_from_bop(label.rotation, **{k[11:]: v for k, v in stored.items()})
     np.testing.assert_allclose(back.rotations, group.rotations, atol=1e-12)
     assert back.axial == group.axial
+
+
+@pytest.mark.parametrize("printed", [None, SymmetryGroup.identity(), SymmetryGroup.two_planes()])
+def test_the_groups_of_shape_and_of_shape_and_print_are_kept_side_by_side(tmp_path, printed):
+    asset = _rigid(tmp_path / "block")
+    back = _write(replace(asset, label=replace(asset.label, print_symmetry=printed))).label
+    assert len(back.symmetry.rotations) == 4
+    assert len(back.symmetry_textured.rotations) == (
+        4 if printed is None else len(printed.rotations)
+    )
+    assert (back.print_symmetry is None) == (printed is None)
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +200,9 @@ BAD_FIELDS = [
     ("block", "label.symmetries_discrete", [[1.0] * 15], "label.symmetries_"),
     ("block", "label.symmetries_continuous", [{"axis": [0, 0, 1]}], "label.symmetries_"),
     ("block", "label.symmetries_continuous", [{}], "label.symmetries_"),
+    ("block", "label.symmetries_discrete_textured", [MIRROR], "symmetries_*_textured"),
+    ("block", "label.symmetries_discrete_textured", DELETED, "symmetries_discrete_textured"),
+    ("block", "label.symmetries_continuous_textured", [{"axis": [0, 0, 1]}], "_textured"),
     ("block", "mass_properties.mass", -0.1, "mass_properties.mass"),
     ("block", "mass_properties.mass", 0, "mass_properties.mass"),
     ("block", "mass_properties.mass", math.inf, "mass_properties.mass"),

@@ -57,3 +57,22 @@ def test_a_missed_bar_is_an_exit_code(recovery, monkeypatch, capsys, angle):
 def test_a_bowl_is_recovered(recovery):
     outcome = recovery.examine("bowl", 0, 0)
     assert outcome.within and outcome.group and outcome.confidence > 0.9
+
+
+def test_confident_labels_that_are_wrong_are_an_exit_code(recovery, monkeypatch, capsys):
+    outcomes = {
+        i: recovery.Outcome("bowl", "axial", i, 0.3, 0.0, True, 0.95, 0.1) for i in range(100)
+    }
+    for index in (3, 4):
+        outcomes[index] = recovery.Outcome("bowl", "axial", index, 0.3, 0.0, False, 0.95, 0.1)
+    monkeypatch.setattr(recovery, "examine", lambda _, index, __: outcomes[index])
+    arguments = ["label_recovery", "--categories", "bowl", "--per-category", "100"]
+    monkeypatch.setattr(sys, "argv", arguments)
+    assert recovery.main() == 1
+    assert "confident labels below 99%" in capsys.readouterr().out
+    outcomes[3] = outcomes[5]
+    assert recovery.main() == 0
+
+
+def test_the_ends_of_a_chips_can_are_alike_to_who_sees_no_print(recovery):
+    assert recovery.examine("chips_can", 1, 0).right

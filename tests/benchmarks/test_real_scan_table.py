@@ -27,9 +27,9 @@ def test_the_bar_is_the_categorys_or_its_types(table):
 
 def test_means_and_medians_have_to_be_within(table):
     figures = ("a", "cup", "cup", True, 10)
-    within = table.Row(*figures, 0.5, 0.2, 4.0, 2.0, 4.0, 0.0, 0.57, 4.1)
-    far = table.Row(*figures, 0.5, 0.3, 4.0, 2.0, 4.0, 0.0, 0.57, 4.1)
-    turned = table.Row(*figures, 0.5, 0.2, 4.2, 2.0, 4.2, 0.0, 0.57, 4.1)
+    within = table.Row(*figures, 0.5, 0.2, 4.0, 2.0, 4.0, 90.0, 0.0, 0.57, 4.1)
+    far = table.Row(*figures, 0.5, 0.3, 4.0, 2.0, 4.0, 90.0, 0.0, 0.57, 4.1)
+    turned = table.Row(*figures, 0.5, 0.2, 4.2, 2.0, 4.2, 90.0, 0.0, 0.57, 4.1)
     assert [row.within for row in (within, far, turned)] == [True, False, False]
 
 
@@ -62,7 +62,7 @@ def test_the_worst_views_are_drawn_worst_first(table, tmp_path):
         group = SymmetryGroup.identity()
         clouds.append(LabelledCloud(points, points, pose, size, group, f"cup/{i}", "cup"))
     rotation = np.radians([1.0, 30.0, 5.0])
-    errors = PoseErrors(rotation / 100, rotation, rotation, rotation)
+    errors = PoseErrors(rotation / 100, rotation, rotation, rotation, rotation)
     lines = table.draw_worst(tmp_path, 2, clouds, np.stack([np.eye(4)] * 3), errors)
     assert [line.split()[1] for line in lines] == ["cup/1:", "cup/2:"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["worst_01.png", "worst_02.png"]

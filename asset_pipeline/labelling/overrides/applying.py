@@ -84,6 +84,7 @@ def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
         if frame.extents is None
         else frame.extents,
         symmetry=label.symmetry if frame.symmetry is None else frame.symmetry,
+        print_symmetry=label.print_symmetry if frame.symmetry is None else None,
     )
 
 

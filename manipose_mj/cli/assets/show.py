@@ -53,6 +53,7 @@ def _rows(asset: Asset) -> list[tuple[str, str]]:
         *((f"label {axis}", _vector(label.rotation[:, i], 3)) for i, axis in enumerate("XYZ")),
         ("extents along them [mm]", _vector(1000 * label.extents)),
         ("symmetry", symmetry_name(label.symmetry)),
+        ("with print", symmetry_name(label.symmetry_textured)),
         ("mass [kg]", f"{mass.mass:.3f}"),
         ("centre of mass [mm]", _vector(1000 * mass.center_of_mass)),
         ("inertia, diagonal [kg m^2]", _vector(mass.inertia.diagonal(), 7)),

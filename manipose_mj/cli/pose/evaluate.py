@@ -53,7 +53,7 @@ def evaluate_pose(
 
     from manipose_mj.cli.pose.clouds import PoseClouds
     from manipose_mj.console import output
-    from manipose_mj.ppf_jax.data.asset_views import asset_clouds
+    from manipose_mj.ppf_jax.data.asset_views import asset_clouds, textured_groups
     from manipose_mj.ppf_jax.data.view_settings import view_setting
     from manipose_mj.ppf_jax.estimator import PoseEstimator
     from manipose_mj.ppf_jax.evaluation.pose_metrics import most_confident, pose_errors, summary
@@ -68,11 +68,12 @@ def evaluate_pose(
     rows = []
     categories = (name,) if assets is not None else PoseClouds(name).categories
     for category in categories:
-        frames = hulls = None
+        frames = hulls = textured = None
         if assets is not None:
             if labels == "original":
                 raise InputError("--assets have unified labels only; leave out --labels original")
             clouds = asset_clouds(assets, name, view_setting(setting), views=views, jobs=jobs)
+            textured = textured_groups(assets)
         else:
             source = PoseClouds(category, jobs=jobs)
             clouds = source.rendered(split, setting, views)
@@ -81,7 +82,7 @@ def evaluate_pose(
             else:
                 hulls = catalogue_hulls(clouds)
         found = predict(estimator, clouds)
-        errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls)
+        errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls, textured=textured)
         sure = summary(errors.of(most_confident(found.confidence, KEPT)))
         figures = {k: v for k, v in summary(errors).items() if not np.isnan(v)}
         rows.append(
@@ -100,7 +101,17 @@ def evaluate_pose(
         output.write_json(rows)
         return 0
     table = Table("category", title=f"{estimator.trained.method}, {setting}, {labels} labels")
-    heads = ("n", "cm", "median", "deg", "median", "flipped", "5 deg 2 cm", "10 deg 5 cm")
+    heads = (
+        "n",
+        "cm",
+        "median",
+        "deg",
+        "median",
+        "with print",
+        "flipped",
+        "5 deg 2 cm",
+        "10 deg 5 cm",
+    )
     for head in (*heads, f"deg of surest {KEPT:.0%}", "ms"):
         table.add_column(head, justify="right")
     for row in rows:
@@ -111,6 +122,7 @@ def evaluate_pose(
             f"{row['origin_cm_median']:.2f}",
             f"{row['deg_mean']:.1f} ({row['nocs_deg_mean']:.1f})",
             f"{row['deg_median']:.1f} ({row['nocs_deg_median']:.1f})",
+            f"{row['textured_deg_mean']:.1f} ({row['textured_deg_median']:.1f})",
             f"{row['flipped']:.1%}",
             f"{row['recall_5deg_2cm']:.0%}",
             f"{row['recall_10deg_5cm']:.0%}",

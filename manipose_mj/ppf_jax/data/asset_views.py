@@ -12,6 +12,7 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
 from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.data.rendering import Subject, render_clouds
 from manipose_mj.ppf_jax.data.view_settings import ViewSetting
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
@@ -43,6 +44,16 @@ def asset_clouds(
         joblib.delayed(views_of)(asset, setting, views) for asset in chosen
     )
     return [cloud for clouds in rendered for cloud in clouds]  # pyright: ignore[reportOptionalIterable, reportGeneralTypeIssues]
+
+
+def textured_groups(directory: Path) -> dict[str, SymmetryGroup]:
+    """The symmetry group of shape and print of every rigid asset in a folder, by its name.
+
+    Raises:
+      InputError: There is no asset in the folder, or one cannot be read.
+    """
+    assets = map(read_asset, list_assets(directory))
+    return {asset.name: asset.label.symmetry_textured for asset in assets if asset.kind == "rigid"}
 
 
 def asset_subject(asset: Asset) -> Subject:

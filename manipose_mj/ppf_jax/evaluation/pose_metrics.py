@@ -27,7 +27,8 @@ class PoseErrors:
 
     Attributes:
       origin: `(n,)` [m], between label origins.
-      rotation: `(n,)` [rad], the least over the symmetry group.
+      rotation: `(n,)` [rad], the least over the symmetry group of the shape.
+      textured_rotation: `(n,)` [rad], the least over the group of shape and print.
       nocs_rotation: `(n,)` [rad], the same, but the angle between the up axes where NOCS counts so.
       mssd: `(n,)` [m], BOP's maximum surface distance, the least over the group; NaN where no hull of
         the object was given.
@@ -35,13 +36,18 @@ class PoseErrors:
 
     origin: Float[np.ndarray, "n"]
     rotation: Float[np.ndarray, "n"]
+    textured_rotation: Float[np.ndarray, "n"]
     nocs_rotation: Float[np.ndarray, "n"]
     mssd: Float[np.ndarray, "n"]
 
     def of(self, rows: np.ndarray) -> PoseErrors:
         """Those of some estimates."""
         return PoseErrors(
-            self.origin[rows], self.rotation[rows], self.nocs_rotation[rows], self.mssd[rows]
+            self.origin[rows],
+            self.rotation[rows],
+            self.textured_rotation[rows],
+            self.nocs_rotation[rows],
+            self.mssd[rows],
         )
 
 
@@ -51,6 +57,7 @@ def pose_errors(
     *,
     sources: Mapping[str, SourceLabel] | None = None,
     hulls: Mapping[str, Float[np.ndarray, "h 3"]] | None = None,
+    textured: Mapping[str, SymmetryGroup] | None = None,
 ) -> PoseErrors:
     """The error of each estimate against its cloud's label.
 
@@ -60,6 +67,7 @@ def pose_errors(
       sources: By the object's name, where the estimates are of the sources' frames.
       hulls: Corners of the objects' convex hulls by their names, label frame [m]: no point of a shape
         moves further than one of them.
+      textured: Groups of shape and print by the objects' names, where they are not the shapes'.
 
     Raises:
       InputError: There are not as many estimates as clouds, or some are not finite.
@@ -82,14 +90,16 @@ def pose_errors(
             origin = _source_origin_error(estimate, truth, turns[owner], own)
             estimate = estimate @ invert(own)
             _, rotation = pose_error(estimate, truth, cloud.symmetry)
+        printed = (textured or {}).get(owner, cloud.symmetry)
+        _, with_print = pose_error(estimate, truth, printed)
         nocs = rotation
         if cloud.category in HANDLED and not handle_seen(cloud):
             _, nocs = pose_error(estimate, truth, SymmetryGroup.about_x())
         distance = np.nan
         if hulls is not None:
             distance = mssd(estimate, truth, turns[owner], hulls[owner])
-        rows.append((float(origin), float(rotation), float(nocs), float(distance)))
-    return PoseErrors(*np.array(rows, float).reshape(-1, 4).T)
+        rows.append([float(v) for v in (origin, rotation, with_print, nocs, distance)])
+    return PoseErrors(*np.array(rows, float).reshape(-1, 5).T)
 
 
 def _source_origin_error(
@@ -149,13 +159,15 @@ def summary(errors: PoseErrors) -> dict[str, float | int]:
     if not count:
         raise InputError("no estimates to sum up")
     origin, degrees = 100 * errors.origin, np.degrees(errors.rotation)
-    nocs = np.degrees(errors.nocs_rotation)
+    nocs, printed = np.degrees(errors.nocs_rotation), np.degrees(errors.textured_rotation)
     figures: dict[str, float | int] = {
         "n": count,
         "origin_cm_mean": float(origin.mean()),
         "origin_cm_median": float(np.median(origin)),
         "deg_mean": float(degrees.mean()),
         "deg_median": float(np.median(degrees)),
+        "textured_deg_mean": float(printed.mean()),
+        "textured_deg_median": float(np.median(printed)),
         "nocs_deg_mean": float(nocs.mean()),
         "nocs_deg_median": float(np.median(nocs)),
         "flipped": float((errors.rotation > FLIPPED).mean()),

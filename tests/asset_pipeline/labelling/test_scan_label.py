@@ -71,6 +71,28 @@ def test_a_box_lies_along_its_sides(extents, members):
     assert {"plane", "second_plane", "half_turn"} <= set(quality.residuals)
 
 
+@pytest.mark.parametrize("lying", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+def test_a_boxs_axes_go_by_its_lengths_however_it_lies(lying):
+    extents = np.array([0.11, 0.07, 0.045])[list(lying)]
+    label, _ = scan_label(_scan_of(trimesh.creation.box(extents=extents)), "mirror", UP)
+    np.testing.assert_allclose(label.extents, [0.11, 0.07, 0.045], atol=2.5e-3)
+    longest = LEAN[:, int(np.argmax(extents))]
+    assert abs(label.rotation[:, 0] @ longest) > np.cos(np.deg2rad(0.5))
+    assert np.linalg.det(label.rotation) == pytest.approx(1)
+    assert len(label.symmetry.rotations) == 4
+
+
+def test_a_square_slabs_quarter_turns_follow_its_axes_and_a_notebook_keeps_x_across_its_covers():
+    slab = _scan_of(trimesh.creation.box(extents=[0.09, 0.09, 0.03]))
+    label, _ = scan_label(slab, "mirror", UP)
+    assert abs(label.rotation[:, 2] @ LEAN @ UP) > np.cos(np.deg2rad(0.5))
+    quarter = rotation_about(np.array([0.0, 0.0, 1.0]), np.pi / 2)
+    assert len(label.symmetry.rotations) == 8
+    assert np.abs(label.symmetry.rotations - quarter).max(axis=(1, 2)).min() < 1e-9
+    book, _ = scan_label(slab, "mirror", UP, category="notebook")
+    assert abs(book.rotation[:, 0] @ LEAN @ UP) > np.cos(np.deg2rad(0.5))
+
+
 def test_a_mug_stands_on_its_base_and_looks_towards_its_handle():
     label, quality = scan_label(_scan_of(_mug()), "mirror", UP)
     assert _angle(label.rotation[:, 0], LEAN @ UP) < 1
@@ -120,9 +142,11 @@ def test_ends_are_alike_only_where_the_print_is(tmp_path: Path, striped: bool):
     texture = tmp_path / "texture.png"
     Image.fromarray(image).save(texture)
     label, _ = scan_label(tin, "axial", UP, textured=True, texture=texture)
-    assert len(label.symmetry.rotations) == (1 if striped else 2)
+    assert len(label.symmetry.rotations) == 2
+    assert len(label.symmetry_textured.rotations) == (1 if striped else 2)
+    assert label.symmetry_textured.axial
     unread, _ = scan_label(tin, "axial", UP, textured=True)
-    assert len(unread.symmetry.rotations) == 1
+    assert len(unread.symmetry.rotations) == 2 and len(unread.symmetry_textured.rotations) == 1
 
 
 def test_bad_questions_are_refused():

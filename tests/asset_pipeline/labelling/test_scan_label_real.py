@@ -1,5 +1,7 @@
 """Labels of real scans: the axes point where a person sees them, and turns leave the shape in place."""
 
+import tarfile
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +10,7 @@ from asset_pipeline.labelling.scan_label import scan_label
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
 from asset_pipeline.labelling.surface_symmetry import GENERIC_TURNS, residuals
 from asset_pipeline.sources import ycb
-from asset_pipeline.sources.scan import Scan
+from asset_pipeline.sources.scan import Scan, load_scan_mesh
 from manipose_mj.poses import rotation_about
 from tests.places import REAL_DATA
 
@@ -78,6 +80,18 @@ def test_the_pitcher_looks_towards_its_handle_and_the_toy_plane_stands_on_its_wh
     local = (mesh.vertices - pitcher.origin) @ pitcher.rotation
     handle = local[local[:, 1] > 0.8 * local[:, 1].max()]
     assert np.ptp(handle[:, 0]) > 0.1 and np.ptp(handle[:, 2]) < 0.04
+
+
+@pytest.mark.parametrize("told", ["axial", "mirror"])
+def test_a_mugs_y_is_at_its_handle_and_it_is_not_axial(told, tmp_path):
+    with tarfile.open(REAL_DATA / "regressions.tar.xz") as archive:
+        archive.extractall(tmp_path, [m for m in archive if "025_mug" in m.name], filter="data")
+    mesh = load_scan_mesh(next(tmp_path.rglob("*.obj")))
+    label, quality = scan_label(mesh, told, np.array([0.0, 0.0, 1.0]))
+    assert label.object_type == "mirror" and len(label.symmetry.rotations) == 1
+    assert quality.confidence > 0.9
+    handle = mesh.vertices[mesh.vertices[:, 0] > 0.03].mean(axis=0)  # seen in pictures
+    assert np.rad2deg(np.arctan2(*((handle - label.origin) @ label.rotation)[[2, 1]])) < 5
 
 
 @pytest.mark.full

@@ -63,6 +63,15 @@ def test_rotation_is_the_least_over_the_group(group, axis, angle, requested):
     assert np.isnan(errors.mssd[0])
 
 
+def test_a_print_counts_beside_the_shape():
+    cloud, half = seen(SymmetryGroup.three_planes()), turned(Z, np.pi)
+    errors = pose_errors(half, [cloud], textured={"thing_000": SymmetryGroup.two_planes()})
+    assert errors.rotation[0] == pytest.approx(0.0, abs=1e-3)
+    assert errors.textured_rotation[0] == pytest.approx(np.pi, abs=1e-3)
+    alone = pose_errors(half, [cloud])
+    assert alone.textured_rotation[0] == alone.rotation[0]
+
+
 def handle_points(count: int) -> np.ndarray:
     """A body of 8 cm around the axis at y = -2 cm, and `count` points on a handle beyond it."""
     angle = np.linspace(0, 2 * np.pi, 200 - count)
@@ -121,10 +130,13 @@ def test_the_summary_counts_in_degrees_and_centimetres():
     degrees = np.array([1.0, 4.0, 8.0, 170.0])
     origin = np.array([0.01, 0.03, 0.015, 0.02])
     rotation = np.deg2rad(degrees)
-    row = summary(PoseErrors(origin, rotation, rotation * [1, 1, 1, 0], np.full(4, 0.05)))
+    nocs, mssd = rotation * [1, 1, 1, 0], np.full(4, 0.05)
+    row = summary(PoseErrors(origin, rotation, 2 * rotation, nocs, mssd))
     assert row["n"] == 4 and row["flipped"] == 0.25
     assert row["deg_mean"] == pytest.approx(45.75) and row["deg_median"] == pytest.approx(6.0)
     assert row["origin_cm_mean"] == pytest.approx(1.875)
+    assert row["textured_deg_mean"] == pytest.approx(91.5)
+    assert row["textured_deg_median"] == pytest.approx(12.0)
     assert row["nocs_deg_mean"] == pytest.approx(13 / 4)
     assert row["mssd_cm_mean"] == pytest.approx(5.0)
     recalls = [row[f"recall_{name}"] for name in ("5deg_2cm", "5deg_5cm", "10deg_2cm", "10deg_5cm")]
@@ -145,4 +157,4 @@ def test_estimates_that_are_no_poses_are_named():
         pose_errors(np.full((1, 4, 4), np.nan), [cloud])
     empty = np.empty(0)
     with pytest.raises(InputError, match="no estimates"):
-        summary(PoseErrors(empty, empty, empty, empty))
+        summary(PoseErrors(empty, empty, empty, empty, empty))
