@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,6 +13,7 @@ from manipose_mj.mjcf.panda.robot import MAX_OPENING
 
 # How much further than the object the gripper is open on approach, in all [m].
 OPENING_MARGIN = 0.012
+WIDE_MARGIN = 0.035  # for walls that lean or curve
 MIN_CLEARANCE = 0.003  # between the open gripper and what it takes, in all [m]
 # Smallest singular value of the Jacobian (m and rad alike) from which straight motions still go.
 MIN_DEXTERITY = 0.06
@@ -21,22 +22,24 @@ _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 @dataclass(frozen=True)
 class Grasps:
-    """Attributes: tcp_poses `(n, 4, 4)`, `T_world_tcp`, best first; widths `(n,)` [m]."""
+    """Attributes: tcp_poses `(n, 4, 4)`, `T_world_tcp`, best first; widths `(n,)` [m]; margin: how much further the
+    gripper is open on approach [m]."""
 
     tcp_poses: Float[np.ndarray, "n 4 4"]
     widths: Float[np.ndarray, "n"]
+    margin: float = OPENING_MARGIN
 
     def __len__(self) -> int:
         return len(self.widths)
 
     def take(self, index: Int[np.ndarray, "k"]) -> Grasps:
         """These of them, in this order."""
-        return Grasps(self.tcp_poses[index], self.widths[index])
+        return replace(self, tcp_poses=self.tcp_poses[index], widths=self.widths[index])
 
     @property
     def openings(self) -> Float[np.ndarray, "n"]:
         """How far to open before the approach [m]."""
-        return np.minimum(self.widths + OPENING_MARGIN, MAX_OPENING)
+        return np.minimum(self.widths + self.margin, MAX_OPENING)
 
 
 def object_grasps(obj: ObjectEstimate) -> Grasps:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.grasping.candidates import (
+    WIDE_MARGIN,
     Grasps,
     Reach,
     object_grasps,
@@ -74,6 +75,8 @@ def pick_object(
 ) -> ObjectPick:
     """The first grasp, in order of promise, that can be approached and can reach a destination.
 
+    Where there is none, the hand opens wider.
+
     Args:
       planner: Plans in the scene of `estimate`.
       estimate: What is where.
@@ -84,6 +87,23 @@ def pick_object(
       StageFailure: There is none; the reason says at which filter the last ones fell.
     """
     grasps = object_grasps(obj)
+    try:
+        return _pick(planner, estimate, obj, destinations, grasps)
+    except StageFailure as failure:
+        wider = replace(grasps, margin=WIDE_MARGIN)
+        try:
+            return _pick(planner, estimate, obj, destinations, wider)
+        except StageFailure:
+            raise failure from None
+
+
+def _pick(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    obj: ObjectEstimate,
+    destinations: tuple[Float[np.ndarray, "4 4"], ...],
+    grasps: Grasps,
+) -> ObjectPick:
     reach = reachable(grasps.tcp_poses, estimate.joints)
     if not len(reach.index):
         raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")

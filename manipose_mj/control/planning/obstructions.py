@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.control.grasping.candidates import Grasps, object_grasps, reachable
+from manipose_mj.control.grasping.candidates import (
+    OPENING_MARGIN,
+    WIDE_MARGIN,
+    Grasps,
+    object_grasps,
+    reachable,
+)
 from manipose_mj.control.grasping.pick import APPROACH
 from manipose_mj.control.motion.batch_ik import solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -57,7 +65,7 @@ def _sets(
     grasps: Grasps,
     lift: frozenset[str],
 ) -> Blockers:
-    """The blockers of a sample of the grasps in reach, and of lifting the object."""
+    """The blockers of a sample of the grasps in reach that the hand can come straight to, and of lifting the object."""
     if not len(grasps):
         return ()
     grasps = grasps.take(np.unique(np.linspace(0, len(grasps) - 1, _MAX_GRASPS).astype(int)))
@@ -65,13 +73,16 @@ def _sets(
     before, solved = _backed_off(grasps.tcp_poses[reach.index], reach.joints)
     sets = []
     for k, index in enumerate(reach.index):
-        query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=obj.geoms)
-        hit = planner.obstacles(reach.joints[k], query)
-        if solved[k]:
-            hit = hit | planner.obstacles(before[k], query)
-        names = _objects_hit(hit, estimate)
-        if names is not None:
-            sets.append((names - {obj.name}) | lift)
+        if not solved[k]:
+            continue
+        for margin in (OPENING_MARGIN, WIDE_MARGIN):
+            opening = float(replace(grasps, margin=margin).openings[index])
+            query = CollisionQuery(APPROACH, opening=opening, target=obj.geoms)
+            at, before_it = (planner.obstacles(q, query) for q in (reach.joints[k], before[k]))
+            names = _objects_hit(at | before_it, estimate)
+            if names is not None and obj.name not in names:
+                sets.append(names | lift)
+                break
     return smallest(sets, _MAX_SETS)
 
 
