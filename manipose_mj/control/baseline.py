@@ -81,6 +81,11 @@ class Baseline:
         """Where the baseline's knowledge of the present scene comes from."""
         return self._scene().perception
 
+    @property
+    def arm(self) -> ArmModel:
+        """The arm in the present scene."""
+        return self._scene().arm
+
     def _scene(self) -> _Scene:
         """What is compiled for the environment's present scene."""
         if self._compiled.model is not self._environment.physics.model.ptr:

@@ -100,7 +100,7 @@ def test_a_held_object_does_not_slip(name):
     executor = Executor(baseline.perception, task.control_timestep)
     rng = np.random.default_rng(0)
     scene = executor.observe().scene
-    planner = MotionPlanner(scene, baseline._scene().arm, task.control_timestep, rng)
+    planner = MotionPlanner(scene, baseline.arm, task.control_timestep, rng)
     primitives = Primitives(executor)
 
     def play(actions) -> None:

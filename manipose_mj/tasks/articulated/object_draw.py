@@ -22,7 +22,7 @@ _PIECES = 30  # that are looked at for one with a cavity that something fits
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RequestedFurniture:
     """What a task with furniture is about.
 
     Attributes:
@@ -39,12 +39,14 @@ class Wanted:
 class FurnitureDraw:
     """A piece of furniture and a part of it."""
 
-    def __init__(self, wanted: Wanted, env_config: EnvConfig, *, hollow: bool) -> None:
+    def __init__(
+        self, requested: RequestedFurniture, env_config: EnvConfig, *, hollow: bool
+    ) -> None:
         """Loads what the user chose; of that, furniture takes the place of the built-in pieces."""
         own = _own(env_config, rigid=False)
-        rows = [CATALOGUE[name] for name in wanted.categories]
+        rows = [CATALOGUE[name] for name in requested.categories]
         pool = own or builtin(env_config.split, rows)
-        self._parts = partial(possible_parts, choice=wanted.choice, hollow=hollow)
+        self._parts = partial(possible_parts, choice=requested.choice, hollow=hollow)
         self.pieces = Candidates(pool, self._parts)
 
     def draw(self, rng: np.random.RandomState, spec: EpisodeSpec) -> tuple[Asset, MovingPart]:
@@ -82,7 +84,7 @@ class PieceDraw(FurnitureDraw):
         return SceneObjects((asset,), part.name)
 
 
-def furniture_alone(wanted: Wanted) -> ObjectDrawFactory:
+def furniture_alone(requested: RequestedFurniture) -> ObjectDrawFactory:
     """A draw for tasks that move a part and need nothing else."""
 
     def make(env_config: EnvConfig) -> PieceDraw:
@@ -91,7 +93,7 @@ def furniture_alone(wanted: Wanted) -> ObjectDrawFactory:
                 raise InputError(
                     f"{asset.folder}: is a {asset.kind} asset; tasks that open or close take articulated ones"
                 )
-        return PieceDraw(wanted, env_config, hollow=False)
+        return PieceDraw(requested, env_config, hollow=False)
 
     return make
 
@@ -99,10 +101,12 @@ def furniture_alone(wanted: Wanted) -> ObjectDrawFactory:
 class CavityDraw:
     """A piece, a part that shuts a cavity, an object for it, and others that fit as well."""
 
-    def __init__(self, wanted: Wanted, env_config: EnvConfig, *, taken: bool, fillers: int) -> None:
-        self._furniture = FurnitureDraw(wanted, env_config, hollow=True)
+    def __init__(
+        self, requested: RequestedFurniture, env_config: EnvConfig, *, taken: bool, fillers: int
+    ) -> None:
+        self._furniture = FurnitureDraw(requested, env_config, hollow=True)
         self._own = _own(env_config, rigid=True)
-        self._stored = wanted.stored
+        self._stored = requested.stored
         self._split: Split = env_config.split
         self._taken, self._fillers = taken, fillers
         # By folder and part: the object in question, and those that may lie beside it.
@@ -155,17 +159,17 @@ class CavityDraw:
         return self._fitting[key]
 
 
-def with_cavity(wanted: Wanted, *, taken: bool, fillers: int) -> ObjectDrawFactory:
+def with_cavity(requested: RequestedFurniture, *, taken: bool, fillers: int) -> ObjectDrawFactory:
     """A draw for tasks that store objects or take them out.
 
     Args:
-      wanted: The furniture, its parts, and what is stored.
+      requested: The furniture, its parts, and what is stored.
       taken: Whether the object is taken out.
       fillers: How many others there are.
     """
 
     def make(env_config: EnvConfig) -> CavityDraw:
-        return CavityDraw(wanted, env_config, taken=taken, fillers=fillers)
+        return CavityDraw(requested, env_config, taken=taken, fillers=fillers)
 
     return make
 

@@ -7,7 +7,11 @@ from math import radians
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.furniture import Standing
-from manipose_mj.tasks.articulated.object_draw import Wanted, furniture_alone, with_cavity
+from manipose_mj.tasks.articulated.object_draw import (
+    RequestedFurniture,
+    furniture_alone,
+    with_cavity,
+)
 from manipose_mj.tasks.articulated.open_close import OpenClose, OpenCloseConfig
 from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part
 from manipose_mj.tasks.articulated.store import Store, StoreConfig
@@ -23,7 +27,9 @@ _STORED_BESIDE, _LEFT_INSIDE = 2, 1
 _SETTLE_INSIDE = 1.2
 # A door half open would be where the hand is at home.
 _PAST_HOME = (0.9, 1.0)
-_CANS_IN_DRAWERS = Wanted(_ANY_CABINET, PartChoice(("drawer",), "middle"), ("chips_can",))
+_CANS_IN_DRAWERS = RequestedFurniture(
+    _ANY_CABINET, PartChoice(("drawer",), "middle"), ("chips_can",)
+)
 
 
 @register_task(
@@ -43,7 +49,7 @@ class Openable:
 
     Attributes:
       phrase: What it is, for descriptions.
-      wanted: The furniture and its parts.
+      requested: The furniture and its parts.
       standing: Where the furniture stands.
       start_open: How far open it is when it is to be shut, of its range.
       shut: By which fraction of its range it must be shut after something was stored or taken out;
@@ -51,7 +57,7 @@ class Openable:
     """
 
     phrase: str
-    wanted: Wanted
+    requested: RequestedFurniture
     standing: Standing = field(default_factory=Standing)
     start_open: tuple[float, float] = (0.6, 1.0)
     shut: float | None = None
@@ -61,7 +67,7 @@ OPENABLES: dict[str, Openable] = {
     **{
         f"{level}_drawer": Openable(
             f"the {level} drawer of a cabinet",
-            Wanted(_ANY_CABINET, PartChoice(("drawer",), level)),
+            RequestedFurniture(_ANY_CABINET, PartChoice(("drawer",), level)),
             # The hand gets at a handle from the front only with room below.
             Standing(plinth=0.15 if level == "bottom" else 0.0),
             # Wide open, the top drawer would be where the hand is at home.
@@ -71,21 +77,21 @@ OPENABLES: dict[str, Openable] = {
     },
     "cabinet_door": Openable(
         "a door of a cabinet",
-        Wanted(_ANY_CABINET, PartChoice(("door",))),
+        RequestedFurniture(_ANY_CABINET, PartChoice(("door",))),
         Standing(x=(0.66, 0.72), y=(-0.15, -0.05)),
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "microwave": Openable(
         "a microwave",
-        Wanted(("microwave",), PartChoice(("door", "flap"))),
+        RequestedFurniture(("microwave",), PartChoice(("door", "flap"))),
         Standing(x=(0.66, 0.72), y=(-0.15, -0.05), plinth=0.10),
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "oven": Openable(
         "an oven, whose door is hinged at the bottom",
-        Wanted(("oven",), PartChoice(("flap", "door"))),
+        RequestedFurniture(("oven",), PartChoice(("flap", "door"))),
         Standing(x=(0.68, 0.72), y=(-0.05, 0.05), yaw=radians(6), plinth=0.12),
         shut=0.95,
     ),
@@ -165,10 +171,10 @@ def _part(objects: SceneObjects) -> MovingPart:
 
 for _name, _openable in OPENABLES.items():
     for _verb, _make, _draws in (
-        ("open", _open, furniture_alone(_openable.wanted)),
-        ("close", _close, furniture_alone(_openable.wanted)),
-        ("store", _store, with_cavity(_openable.wanted, taken=False, fillers=_STORED_BESIDE)),
-        ("take_out", _take_out, with_cavity(_openable.wanted, taken=True, fillers=_LEFT_INSIDE)),
+        ("open", _open, furniture_alone(_openable.requested)),
+        ("close", _close, furniture_alone(_openable.requested)),
+        ("store", _store, with_cavity(_openable.requested, taken=False, fillers=_STORED_BESIDE)),
+        ("take_out", _take_out, with_cavity(_openable.requested, taken=True, fillers=_LEFT_INSIDE)),
     ):
         register_task("articulated", f"{_verb}_{_name}", tags=("articulated", _verb), draws=_draws)(
             _make(_openable)

@@ -9,6 +9,7 @@ import numpy as np
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.clutter.pile_layout import rolls
 from manipose_mj.tasks.core.candidates import Candidates, builtin, chosen, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects, Strata
@@ -17,9 +18,6 @@ from manipose_mj.tasks.scene.resting import require_graspable
 SETS = 200  # of built-in objects, in each split; their piles are kept on disk
 OBJECTS = 12  # in a set; a pile is made of some of them
 LONGEST = 0.20  # side of an object; longer ones reach out of a pile [m]
-_MOST_ROLLING = 3  # in a set: what rolls does not stay in a pile
-_LEVEL = 0.7  # of the label's axis of symmetry along the vertical, below which an object may roll
-_OFTEN = 0.2  # of the drops that end so
 # What lies flat, and holds up what lies on it.
 _FLAT = (
     "box", "camera", "clock", "computer_mouse", "container", "drinkbox", "notebook", "remote", "steel_tape",
@@ -29,9 +27,11 @@ _FLAT = (
 
 @dataclass(frozen=True)
 class Mixture:
-    """Attributes: flat: how many objects of a set are of categories that lie flat, at least."""
+    """Attributes: flat: how many objects of a set are of categories that lie flat, at least; rolling: how many
+    may roll, at most."""
 
     flat: int
+    rolling: int = 3
 
 
 class PileDraw:
@@ -72,7 +72,7 @@ class PileDraw:
         while len(found) < OBJECTS:
             pool = self._flat if len(found) < self._mixture.flat else self._any
             asset = pool.draw(rng, without=[each.name for each in found])
-            if not _rolls(asset) or sum(map(_rolls, found)) < _MOST_ROLLING:
+            if not rolls(asset) or sum(map(rolls, found)) < self._mixture.rolling:
                 found.append(asset)
         return tuple(found)
 
@@ -99,12 +99,3 @@ def _fit_for_piles(asset: Asset) -> None:
             f"{asset.folder}: {asset.name} is {1000 * longest:.0f} mm long; piles take up to "
             f"{1000 * LONGEST:.0f} mm"
         )
-
-
-def _rolls(asset: Asset) -> bool:
-    """Whether it often comes to lie on its round side."""
-    if not asset.label.symmetry.axial:
-        return False
-    ups = np.array([abs((p.rotation @ asset.label.rotation)[2, 0]) for p in asset.stable_poses])
-    shares = np.array([pose.probability for pose in asset.stable_poses])
-    return bool(shares[ups < _LEVEL].sum() > _OFTEN)

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.physics import REST_ANGULAR_SPEED, REST_LINEAR_SPEED
 from manipose_mj.tasks.clutter.pile_layout import PileConfig, choose, drops
 from manipose_mj.tasks.clutter.pile_scene import PileScene
 from manipose_mj.tasks.core.start import NoStartError
@@ -24,7 +25,9 @@ _FALL_TIME = 0.4  # until the next one falls [s]
 _REST_TIME = 4.0  # for the pile to come to rest without walls [s]
 _STILL_TIME = 0.2  # for which it then has to be still [s]
 _CALM_TIME = 0.6  # for a pile at rest to be so in fine steps too [s]
-_STILL = (0.0005, 0.005)  # [m/s, rad/s]; friction that creeps turns them faster
+_STILL = (0.0005, 0.005)  # on average [m/s, rad/s]; friction that creeps turns them faster
+# At any moment, half of what counts as rest: meshes that touch in few points tremble [m/s, rad/s].
+_TREMBLING = (REST_LINEAR_SPEED / 2, REST_ANGULAR_SPEED / 2)
 _PENETRATION = 0.002  # allowed in a pile at rest [m]
 
 
@@ -88,10 +91,10 @@ def _dropped(assets: Sequence[Asset], config: PileConfig, rng: np.random.Generat
         scene.drop(order, drop.rotation, drop.xy, _DROP_GAP, _DROP_SPEED)
         scene.run(_FALL_TIME)
     scene.remove_walls()
-    if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread, tremble=True):
+    if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread):
         return None
     scene.step_finely()
-    still = scene.rest(_CALM_TIME, _STILL_TIME, _STILL, config.spread, tremble=False)
+    still = scene.rest(_CALM_TIME, _STILL_TIME, _STILL, config.spread, momentary=_TREMBLING)
     kept = np.flatnonzero(scene.kept)
     if not still or len(kept) < config.count[0] or scene.penetration() > _PENETRATION:
         return None

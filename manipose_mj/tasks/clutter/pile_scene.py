@@ -124,17 +124,17 @@ class PileScene:
         limits: tuple[float, float],
         spread: float,
         *,
-        tremble: bool,
+        momentary: tuple[float, float] | None = None,
     ) -> bool:
         """Let time pass until everything has been still for a while; whether it came to that.
 
         Args:
           longest: Time that may pass [s].
           still: For how long it has to be still [s].
-          limits: Of speeds that count as still [m/s, rad/s].
+          limits: Of speeds that count as still, means over the time between two looks [m/s, rad/s].
           spread: What gets farther from the middle is taken away [m].
-          tremble: Whether objects are still that tremble on the spot, as piles do in coarse steps: speeds are
-            then means over the time between two looks, not those of a moment.
+          momentary: Limits of the speeds at each look as well; None: objects may tremble on the spot, as they do
+            in coarse steps [m/s, rad/s].
         """
         quiet = 0.0
         before = self._configurations()
@@ -142,14 +142,12 @@ class PileScene:
             self.run(_PIECE)
             self._take_away(spread)
             now = self._configurations()
-            if tremble:
-                linear, angular = _way(before, now) / _PIECE
-            else:
-                velocity = self._data.qvel.reshape(-1, 6)
-                linear = np.linalg.norm(velocity[:, :3], axis=1).max()
-                angular = np.linalg.norm(velocity[:, 3:], axis=1).max()
+            calm = (_way(before, now) / _PIECE < limits).all()
+            if momentary is not None:
+                velocity = self._data.qvel.reshape(-1, 2, 3)
+                calm &= (np.linalg.norm(velocity, axis=2) < momentary).all()
             before = now
-            quiet = quiet + _PIECE if linear < limits[0] and angular < limits[1] else 0.0
+            quiet = quiet + _PIECE if calm else 0.0
             if quiet > still - 1e-9:
                 return True
         return False

@@ -12,7 +12,8 @@ from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.registry import register_task
 from manipose_mj.tasks.core.scene_objects import SceneObjects
 
-_HEAP, _STACK, _COVER = pile_of(Mixture(flat=4)), pile_of(Mixture(flat=6)), pile_of(Mixture(flat=7))
+_HEAP, _STACK = pile_of(Mixture(flat=4)), pile_of(Mixture(flat=6))
+_COVER = pile_of(Mixture(flat=7, rolling=1))
 
 
 @register_task("clutter", "pick", tags=("clutter", "rigid", "pose_goal"), draws=_HEAP)

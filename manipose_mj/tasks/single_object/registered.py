@@ -20,7 +20,7 @@ from manipose_mj.tasks.single_object.reorient import Reorient, tipped_poses
 from manipose_mj.tasks.single_object.target_pose import TargetPose, TargetPoseConfig, pose_pairs
 
 
-def _movable(asset: Asset) -> None:
+def _graspable(asset: Asset) -> None:
     require_graspable(asset)
     pose_pairs(asset, TargetPoseConfig())
 
@@ -35,12 +35,12 @@ def _tipping(asset: Asset) -> None:
     tipped_poses(asset)
 
 
-_MOVABLE = one_object(_movable, rigid_rows())
+_GRASPABLE = one_object(_graspable, rigid_rows())
 _TURNABLE = one_object(_turnable, rigid_rows())
 _MUG = one_object(_tipping, (CATALOGUE["mug"],))
 
 
-@register_task("single_object", "target_pose", tags=("rigid", "pose_goal"), draws=_MOVABLE)
+@register_task("single_object", "target_pose", tags=("rigid", "pose_goal"), draws=_GRASPABLE)
 def target_pose(env_config: EnvConfig, objects: SceneObjects) -> TargetPose:
     """Set one object down at a 6D goal pose on the table, from any of its stable poses.
 
@@ -50,7 +50,7 @@ def target_pose(env_config: EnvConfig, objects: SceneObjects) -> TargetPose:
 
 
 @register_task(
-    "single_object", "target_pose_shelf", tags=("rigid", "pose_goal", "shelf"), draws=_MOVABLE
+    "single_object", "target_pose_shelf", tags=("rigid", "pose_goal", "shelf"), draws=_GRASPABLE
 )
 def target_pose_shelf(env_config: EnvConfig, objects: SceneObjects) -> TargetPose:
     """Take one object from the table to a 6D goal pose on a shelf's board, under it or by it.
@@ -61,7 +61,7 @@ def target_pose_shelf(env_config: EnvConfig, objects: SceneObjects) -> TargetPos
     return TargetPose(objects.assets, env_config, IntoShelfConfig())
 
 
-@register_task("single_object", "position", tags=("rigid", "pose_goal", "shelf"), draws=_MOVABLE)
+@register_task("single_object", "position", tags=("rigid", "pose_goal", "shelf"), draws=_GRASPABLE)
 def position(env_config: EnvConfig, objects: SceneObjects) -> TargetPose:
     """Take one object from a place by, in or under a shelf to a goal pose on the table or a board.
 
