@@ -173,8 +173,10 @@ def test_overriding_moves_the_frame_and_leaves_the_object_where_it_is(tmp_path):
 def test_another_type_is_measured_anew(tmp_path):
     asset = made.block(tmp_path / "block")
     mesh = surface(visible_shapes(asset.folder))
-    told = overridden(asset, _entry(object_type="mirror", up=[1, 0, 0]), mesh, textured=True)
+    told = overridden(asset, _entry(object_type="axial", up=[1, 0, 0]), mesh, textured=True)
     np.testing.assert_allclose(told.label.rotation[:, 0], [1, 0, 0], atol=1e-3)
+    box = overridden(asset, _entry(object_type="mirror", up=[1, 0, 0]), mesh, textured=True)
+    np.testing.assert_allclose(box.label.extents, sorted(made.SIZE)[::-1], atol=1e-3)
     np.testing.assert_array_equal(told.up, [1, 0, 0])
     assert told.label_quality is not None
     held = overridden(
