@@ -27,6 +27,10 @@ ROUND_LENGTH, ROUND_SHARE = (
     0.012,
 )  # out of round by no more, in length [m] or of the diagonal
 MAX_ROUNDNESS = 0.6  # of that, which a body's residual leaves at most; a hat's leaves more
+ROUNDS = 3  # of fitting the axis to the body and finding the body about the axis
+HOPELESS = (
+    0.1  # a share of body below which no axis is near; a large handle pulls the first one off
+)
 BODY_SHARE = 0.6  # of the upright surface, that a body of revolution has at least
 HEIGHTS = 64  # slices of the radial profile
 REACH_LIMITS = 1.6  # a part reaches out of the profile by so many times what is out of round
@@ -78,14 +82,14 @@ def vessel_shape(cloud: SurfaceCloud, up: Float[np.ndarray, "3"]) -> VesselShape
     probes = np.arange(len(cloud.points))[cloud.thinned(PROBES)]
     axis, point = half_turn_axis(cloud, up, cloud.points.mean(axis=0))
     axis = axis if axis @ up > 0 else -axis
-    for _ in range(2):
+    for _ in range(ROUNDS):
         gaps = np.stack([residuals(cloud, rotation_about(axis, t), point) for t in TURNS])
         body = (gaps <= limit).mean(axis=0) > 0.5
         upright = (
             1 - (cloud.normals[probes] @ axis) ** 2
         )  # what lies flat says nothing about a turn
         share = float(upright @ body / upright.sum())
-        if share < BODY_SHARE / 2:
+        if share < HOPELESS:
             return None
         axis, point = half_turn_axis(cloud, axis, point, probes[body])
     roundness = float(np.percentile(np.median(gaps[:, body], axis=0), 85))
