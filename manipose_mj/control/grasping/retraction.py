@@ -73,16 +73,14 @@ def find_place(
     return None
 
 
-def _of_each_other(
-    owner: Int[np.ndarray, "k"], order: Int[np.ndarray, "k"]
-) -> list[Int[np.ndarray, ""]]:
+def _of_each_other(owner: Int[np.ndarray, "k"], order: Int[np.ndarray, "k"]) -> list[int]:
     """The first in order of each destination that is not among the first few."""
     seen = {int(owner[k]) for k in order[:_MAX_PLACES]}
     found = []
     for k in order[_MAX_PLACES:]:
         if int(owner[k]) not in seen:
             seen.add(int(owner[k]))
-            found.append(k)
+            found.append(int(k))
     return found[:_MAX_OTHERS]
 
 

@@ -13,6 +13,7 @@ from manipose_mj.control.execution.executor import Executor
 from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.grasping.object_push import push_object
 from manipose_mj.control.grasping.retraction import lowering
+from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.set_aside import places_pushed
@@ -32,9 +33,9 @@ def environment():
 
 
 def _planner(environment, baseline) -> MotionPlanner:
-    scene = baseline.perception.observe().scene
-    timestep = environment.task.control_timestep
-    return MotionPlanner(scene, baseline._arm, timestep, np.random.default_rng(0))
+    task, scene = environment.task, baseline.perception.observe().scene
+    arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
+    return MotionPlanner(scene, arm, task.control_timestep, np.random.default_rng(0))
 
 
 def _reset(environment, baseline):

@@ -54,6 +54,7 @@ def test_what_lies_on_the_target_goes_first_and_aside(stacked):
         assert pose[2, 3] > 0 and np.linalg.norm(pose[:2, 3] - goal.pose[:2, 3]) > 0.05
 
 
+@pytest.mark.full
 def test_other_moves_are_tried_before_it_gives_up(stacked):
     environment, perception, planner = stacked
     estimate = perception.observe()
