@@ -45,7 +45,7 @@ def scene(request) -> tuple[MotionPlanner, SceneEstimate, PartEstimate]:
     environment.reset()
     baseline = Baseline(environment)
     estimate = baseline.perception.observe()
-    planner = MotionPlanner(estimate.scene, baseline._arm, 0.02, np.random.default_rng(0))
+    planner = MotionPlanner(estimate.scene, baseline.arm, 0.02, np.random.default_rng(0))
     return planner, estimate, estimate.parts[environment.task.part.name]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -78,10 +79,11 @@ def _perception(environment, estimator) -> EstimatedPerception:
 
 def _plan_and_pick(environment, estimator) -> tuple[str, np.ndarray, np.ndarray]:
     baseline = Baseline(environment, "estimated")
-    baseline._perception = perception = _perception(environment, estimator)
+    perception = _perception(environment, estimator)
+    baseline._compiled = replace(baseline._compiled, perception=perception)
     perception.reset(0)
     estimate = perception.observe()
-    planner = MotionPlanner(estimate.scene, baseline._arm, 0.02, np.random.default_rng(0))
+    planner = MotionPlanner(estimate.scene, baseline.arm, 0.02, np.random.default_rng(0))
     plan = make_plan(environment.task.goals, estimate, planner)
     pick = pick_object(planner, estimate, estimate.objects["object"], plan[1].poses)
     return plan_to_json(plan), pick.free_path, pick.approach

@@ -57,7 +57,7 @@ class Scene:
         baseline = self._baseline
         rng = np.random.default_rng(0)
         estimate = baseline.perception.observe()
-        planner = MotionPlanner(estimate.scene, baseline._arm, self.task.control_timestep, rng)
+        planner = MotionPlanner(estimate.scene, baseline.arm, self.task.control_timestep, rng)
         return planner, estimate
 
 
