@@ -20,7 +20,7 @@ from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
 from manipose_mj.control.planning.planner import candidate_plans
 from manipose_mj.control.planning.rearrangement import in_clutter, is_supported
-from manipose_mj.control.scene.scene_estimate import Perception
+from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -42,10 +42,11 @@ class _Progress:
         """Something was set down."""
         self.failures_here, self._last = 0, ""
 
-    def failed_again(self, plan: Plan) -> bool:
-        """Count a failure; whether it is of the plan that failed before."""
+    def failed_again(self, plan: Plan, estimate: SceneEstimate) -> bool:
+        """Count a failure; whether it is of the plan that failed before, with nothing opened since."""
         self.failures_here += 1
-        text = plan_to_json(plan)
+        openings = {part.name: round(_share_open(part), 1) for part in estimate.parts.values()}
+        text = f"{plan_to_json(plan)} {openings}"
         same, self._last = text == self._last, text
         return same
 
@@ -132,7 +133,7 @@ class Baseline:
                 failures += 1
                 most = MAX_FAILED_MOVES if step_by_step else MAX_PLANS
                 # In clutter the same plan may be carried out another way.
-                same = progress.failed_again(plan) and not step_by_step
+                same = progress.failed_again(plan, executor.observe()) and not step_by_step
                 exhausted = same or failures == most
                 if exhausted or failure.stage not in _WORTH_ANOTHER_PLAN:
                     raise
@@ -159,6 +160,11 @@ class Baseline:
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()
+
+
+def _share_open(part: PartEstimate) -> float:
+    low, high = part.joint.range
+    return (part.opening - low) / (high - low)
 
 
 def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:
