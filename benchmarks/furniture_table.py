@@ -70,7 +70,7 @@ class Row:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--assets", type=Path, help="folder of asset folders")
     parser.add_argument("--only", nargs="+", default=[], help="names of assets")
     parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")

@@ -21,7 +21,7 @@ _LIMIT_MARGIN = 0.10  # [rad]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--samples", type=int, default=20_000_000)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()

@@ -118,7 +118,7 @@ class PlaceScore:
                     break
                 # Backwards from the wide open door: from which layers on it can be pushed.
                 free = around.of(ajar).free(hold)
-                pushed = chained(free[:, ::-1], _STEPS).any(axis=2)[:, ::-1]
+                pushed = np.any(chained(free[:, ::-1], _STEPS), axis=2)[:, ::-1]
                 last = np.round(led[ajar] * (LAYERS - 1)).astype(int)
                 value[ajar[pushed[np.arange(len(ajar)), last]]] = COMPLETE
         return value, ease
@@ -214,7 +214,7 @@ class _Surroundings:
         wrist, shares = _points(tcp, _WRIST[None]), _FOREARM[None, :, None]
         points = np.concatenate([hand, (1 - shares) * wrist + shares * shoulder], axis=1)
         height = self.bases[c, 2, 3][:, None] + points[..., 2]
-        free = (height > self.floors[c][:, None] + _RADII).all(axis=1)
+        free = np.all(height > self.floors[c][:, None] + _RADII, axis=1)
         back, moving = invert(self.motions)[k], self.shape.moving[None]
 
         def moved(points: Float[np.ndarray, "p n 3"]) -> Float[np.ndarray, "p n 3"]:
