@@ -29,7 +29,8 @@ _STANDOFFS = (0.10, 0.07, 0.05)  # from which a handle is approached [m]
 _PUSH_STANDOFFS = ((0.05, 0.0), (0.03, 0.0), (0.02, 0.12), (0.02, 0.07))
 # A grip that moves a part by less than this share of what is asked is of no use; a door is pushed
 # the rest of the way.
-MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
+_MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
+_AJAR = 0.5  # of a door, enough to reach behind it [rad]
 _STEP_BACK = 6  # poses of a way
 _MAX_PUSHES = 24  # for which a way is looked for
 _MAX_TRIES = 12  # complete ways for which an approach is looked for
@@ -70,16 +71,16 @@ def grip_handle(
     Raises:
       StageFailure: None moves it by a fair share of the way.
     """
-    least = MIN_SHARE[part.joint.kind]
+    anywhere = opening is None
     if opening is None:
-        least, (low, high) = 0.0, part.joint.range
+        low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways = [
         way
         for hold in grips(part)
         if (led := find_way(planner, part, hold, opening, near=estimate.joints)) is not None
         and (way := ending_free(planner, part, led)) is not None
-        and share_of(way, part, opening) >= least
+        and (anywhere or leads_enough(way, part, opening))
     ]
     ways.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
     # At low handles the wrist is within millimetres of the table: only if nothing else will do.
@@ -177,6 +178,14 @@ def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Itera
 def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:
     """How much of the way to `opening` it goes."""
     return float((way.openings[-1] - part.opening) / (opening - part.opening))
+
+
+def leads_enough(way: PartWay, part: PartEstimate, opening: float) -> bool:
+    """Whether a grip's way is of use towards `opening`: a push may do the rest of a door's."""
+    share = share_of(way, part, opening)
+    if share >= _MIN_SHARE[part.joint.kind]:
+        return True
+    return part.joint.kind == "hinge" and float(way.openings[-1] - part.opening) >= _AJAR
 
 
 def _turned(way: PartWay) -> float:

@@ -16,6 +16,7 @@ from manipose_mj.tasks.articulated.part_shape import PartShape
 _TILT_STEP = radians(15)
 _GRIP_TILT, _PUSH_TILT = radians(75), radians(90)
 _INSET = 0.022  # of a push on a door's inside, from its free edge [m]
+_BACK = 0.004  # of a grip, which need not be in the middle of the bar [m]
 _TIP = 0.009  # from the TCP to the closed fingers' tips [m]
 _SHARES = (1.0, 0.6, 0.35)  # of a door's radius, where it may be pushed
 
@@ -41,7 +42,7 @@ def around_the_bar(part: MovingPart) -> tuple[HandPlaces, ...]:
     along, _, across = handle.extents
     bars = [(x, across), (z, along)] if along < MAX_OPENING else [(x, across)]
     return tuple(
-        HandPlaces(_tilted(handle.origin, out, bar, bar, _GRIP_TILT, 0.0), float(width))
+        HandPlaces(_tilted(handle.origin, out, bar, bar, _GRIP_TILT, _BACK), float(width))
         for bar, width in bars
     )
 

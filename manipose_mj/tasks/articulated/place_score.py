@@ -33,7 +33,7 @@ COMPLETE = (
 )
 _TRAVEL = 0.95  # of the joint's range
 _STEPS = 2  # tilts between layers
-_LEAST_GRIP = 0.35  # of the travel by the handle, before a door can be pushed on from inside
+_AJAR = 0.5  # of a door, to be pushed on from inside [rad]
 _EASE = 0.1  # how much the share of tilts counts that the arm can choose from
 # Points of the hand in the TCP's frame, and how far each has to be from furniture [m].
 _PALM = [(0.0, y, z, 0.024) for y in (-0.085, 0.0, 0.085) for z in (-0.06, -0.09)]
@@ -112,8 +112,9 @@ class PlaceScore:
             ease = np.maximum(ease, way.mean(axis=(1, 2)))
         value = led.copy()
         if self.part.joint.kind == "hinge":
+            ajar_share = min(_AJAR / (_TRAVEL * np.ptp(self.part.joint.range)), 1.0)
             for hold in behind_the_door(self.part, self.shape):
-                ajar = np.flatnonzero((value < COMPLETE) & (led >= _LEAST_GRIP))
+                ajar = np.flatnonzero((value < COMPLETE) & (led >= ajar_share))
                 if not len(ajar):
                     break
                 # Backwards from the wide open door: from which layers on it can be pushed.
