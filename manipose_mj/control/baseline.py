@@ -20,7 +20,7 @@ from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
 from manipose_mj.control.planning.planner import candidate_plans
 from manipose_mj.control.planning.rearrangement import in_clutter, is_supported
-from manipose_mj.control.scene.scene_estimate import Perception
+from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -42,10 +42,11 @@ class _Progress:
         """Something was set down."""
         self.failures_here, self._last = 0, ""
 
-    def failed_again(self, plan: Plan, *, counts: bool) -> bool:
-        """Count a failure, if it `counts`; whether it is of the plan that failed before."""
+    def failed_again(self, plan: Plan, estimate: SceneEstimate, *, counts: bool) -> bool:
+        """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since."""
         self.failures_here += counts
-        text = plan_to_json(plan)
+        openings = {part.name: round(_share_open(part), 1) for part in estimate.parts.values()}
+        text = f"{plan_to_json(plan)} {openings}"
         same, self._last = text == self._last, text
         return same
 
@@ -145,7 +146,8 @@ class Baseline:
                 failures += 1
                 most = MAX_FAILED_MOVES if step_by_step else MAX_PLANS
                 # In clutter the same plan may be carried out another way.
-                same = progress.failed_again(plan, counts=acted or not step_by_step)
+                counts = acted or not step_by_step
+                same = progress.failed_again(plan, executor.observe(), counts=counts)
                 exhausted = (same and not step_by_step) or failures == most
                 mends = (*_WORTH_ANOTHER_PLAN, "release") if step_by_step else _WORTH_ANOTHER_PLAN
                 if exhausted or failure.stage not in mends:
@@ -193,6 +195,11 @@ class Baseline:
         except StageFailure:
             if not step_by_step or primitives.held is not None:
                 raise failure from None
+
+
+def _share_open(part: PartEstimate) -> float:
+    low, high = part.joint.range
+    return (part.opening - low) / (high - low)
 
 
 def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:

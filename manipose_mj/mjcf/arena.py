@@ -23,7 +23,15 @@ TABLE_HALF_EXTENTS = (0.72, 0.8, 0.02)
 TABLE_CENTER = (0.52, 0.0, -0.02)
 TABLE_HEIGHT = 0.75
 CARPET = 0.015
+# Half lengths of what the robot stands on where there is no table; the floor hides what is too long of it.
+_PEDESTAL = (0.17, 0.14, 1.0)
+_PEDESTAL_X = -0.05  # of its middle: under the arm's foot, which reaches backwards
+# The top of a small table beside the pedestal, which is put to one side or the other.
+SIDE_TABLE_CENTER = (0.40, 0.38, 0.0)
+_SIDE_TABLE = (0.24, 0.24, 0.02)
+_AWAY = (0.0, 0.0, -30.0)  # under the floor
 
+_LEG_COLOUR = [0.45, 0.36, 0.28, 1]
 MARKER_GROUP = 4  # of goal markers, which only pictures show
 
 # Position and the point looked at, in the world frame [m]; vertical field of view [deg].
@@ -36,7 +44,11 @@ FIXED_CAMERAS: dict[str, tuple[tuple[float, float, float], tuple[float, float, f
 
 
 class TableArena(composer.Arena):
-    """A table whose top is the plane z = 0; the robot's base stands at the world's origin."""
+    """A table whose top is the plane z = 0, or a pedestal on the floor that is as high; the robot's base stands
+    at the world's origin either way.
+
+    What differs from episode to episode is where bodies without joints are: nothing is compiled anew.
+    """
 
     def _build(self, name: str = "world") -> None:
         super()._build(name=name)
@@ -59,29 +71,52 @@ class TableArena(composer.Arena):
             castshadow=True,
         )  # fmt: skip
         world.add("light", name="fill", pos=[-0.6, 1.2, 1.8], dir=[0.5, -0.6, -1], diffuse=[0.2] * 3, castshadow=False)  # fmt: skip
-        world.add(
-            "geom", name="floor", type="plane", size=[4, 4, 0.1], pos=[0, 0, -TABLE_HEIGHT],
-            rgba=[0.80, 0.80, 0.78, 1], contype=0, conaffinity=0,
+        ground = world.add("body", name="ground", pos=[0, 0, -TABLE_HEIGHT])
+        ground.add(
+            "geom", name="floor", type="plane", size=[4, 4, 0.1], rgba=[0.80, 0.80, 0.78, 1],
+            contype=0, conaffinity=0,
         )  # fmt: skip
         # What falls off the table comes at 4 m/s, 8 mm a physics step: a carpet begins to brake it early.
-        world.add(
+        ground.add(
             "geom", name="carpet", type="plane", size=[4, 4, 0.1], group=COLLISION_GROUP, priority=1,
-            pos=[0, 0, -TABLE_HEIGHT - CARPET], margin=CARPET, friction=[1, 0.005, 0.0001],
+            pos=[0, 0, -CARPET], margin=CARPET, friction=[1, 0.005, 0.0001],
             solref=[0.005, 1], solimp=[0.95, 0.99, 0.001, 0.5, 2],
         )  # fmt: skip
         self._add_table()
+        pedestal = world.add("body", name="pedestal", pos=_AWAY)
+        pedestal.add(
+            "geom", name="pedestal", type="box", size=_PEDESTAL, pos=[_PEDESTAL_X, 0, -_PEDESTAL[2]],
+            rgba=[0.55, 0.57, 0.60, 1],
+        )  # fmt: skip
+        side_table = world.add("body", name="side_table", pos=_AWAY)
+        self._add_top(side_table, "side_table", _SIDE_TABLE, (0.0, 0.0, -_SIDE_TABLE[2]))
+        side_table.add(
+            "geom", name="side_table_foot", type="box", size=[0.05, 0.05, _PEDESTAL[2]],
+            pos=[0, 0, -2 * _SIDE_TABLE[2] - _PEDESTAL[2]], rgba=_LEG_COLOUR,
+        )  # fmt: skip
         for camera, (position, target, fovy) in FIXED_CAMERAS.items():
             world.add(
                 "camera", name=camera, pos=position, xyaxes=look_at(position, target), fovy=fovy
             )
 
+    def stand_robot(
+        self, physics: mjcf.Physics, height: float, *, table: bool, side_table: float = 0.0
+    ) -> None:
+        """Have the robot's base so high above the floor [m], on the table or on the pedestal.
+
+        A side table is to its left for 1, to its right for -1, away for 0. `physics` is not brought up to date.
+        """
+        world = self._mjcf_root.worldbody
+        for name, here in (("table", table), ("pedestal", not table)):
+            physics.bind(world.find("body", name)).pos = (0.0, 0.0, 0.0) if here else _AWAY
+        x, y, z = SIDE_TABLE_CENTER
+        beside = (x, side_table * y, z) if side_table else _AWAY
+        physics.bind(world.find("body", "side_table")).pos = beside
+        physics.bind(world.find("body", "ground")).pos = (0.0, 0.0, -height)
+
     def _add_table(self) -> None:
         table = self._mjcf_root.worldbody.add("body", name="table")
-        table.add(
-            "geom", name="table", type="box", size=TABLE_HALF_EXTENTS, pos=TABLE_CENTER,
-            rgba=[0.72, 0.58, 0.43, 1], friction=SUPPORT_FRICTION, condim=SUPPORT_CONDIM,
-            solref=[SCENE_CONTACT_TIME, 1], solimp=SOLIMP,
-        )  # fmt: skip
+        self._add_top(table, "table", TABLE_HALF_EXTENTS, TABLE_CENTER)
         thickness = 2 * TABLE_HALF_EXTENTS[2]
         leg = (TABLE_HEIGHT - thickness) / 2
         for i, (sx, sy) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
@@ -89,8 +124,21 @@ class TableArena(composer.Arena):
             y = TABLE_CENTER[1] + sy * (TABLE_HALF_EXTENTS[1] - 0.06)
             table.add(
                 "geom", name=f"leg_{i}", type="box", size=[0.03, 0.03, leg], pos=[x, y, -thickness - leg],
-                rgba=[0.45, 0.36, 0.28, 1],
+                rgba=_LEG_COLOUR,
             )  # fmt: skip
+
+    def _add_top(
+        self,
+        body: mjcf.Element,
+        name: str,
+        half: tuple[float, float, float],
+        center: tuple[float, float, float],
+    ) -> None:
+        """The board of a table: half lengths and middle in the body's frame [m]."""
+        body.add(
+            "geom", name=name, type="box", size=half, pos=center, rgba=[0.72, 0.58, 0.43, 1],
+            friction=SUPPORT_FRICTION, condim=SUPPORT_CONDIM, solref=[SCENE_CONTACT_TIME, 1], solimp=SOLIMP,
+        )  # fmt: skip
 
 
 def look_at(

@@ -11,11 +11,10 @@ from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
-    MIN_SHARE,
     ending_free,
+    leads_enough,
     off_surface,
     push_part,
-    share_of,
     way_in_hand,
 )
 from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
@@ -176,7 +175,7 @@ class Primitives:
         self._check_held(estimate, step.subject)
         way = way_in_hand(planner, estimate, part, step.opening)
         way = None if way is None else ending_free(planner, part, way)
-        if way is None or share_of(way, part, step.opening) < MIN_SHARE[part.joint.kind]:
+        if way is None or not leads_enough(way, part, step.opening):
             raise StageFailure("plan", f"the arm cannot carry {part.name} far by its handle")
         yield from self._executor.follow(way.targets(self._executor.timestep))
         moved = self._executor.observe().parts[part.name].opening

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from math import radians
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.assets.franka_hand import FINGER_BOXES, FINGER_OFFSET, PAD_BOX, TCP_OFFSET
+from manipose_mj.assets.franka_hand import (
+    FINGER_BOXES,
+    FINGER_OFFSET,
+    MAX_OPENING,
+    PAD_BOX,
+    TCP_OFFSET,
+)
+from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.scene_estimate import PartEstimate
 from manipose_mj.poses import compose, invert, rotation_about
@@ -20,6 +28,10 @@ _GRIP_TILT = radians(75)
 _PUSH_TILT = radians(90)
 _X = np.array([1.0, 0.0, 0.0])
 _MIN_GRIP = 0.012  # of the bar beyond the middle of the fingers [m]
+_MAX_WIDTH = MAX_OPENING - 0.004  # of what the gripper takes [m]
+# Of the bar's frame: about the handle's Y, so that the hand may tilt about the handle's Z.
+_CROSSWISE = compose(rotation_about(np.array([0.0, 1.0, 0.0]), -np.pi / 2), np.zeros(3))
+_BACK, _BACK_SHARE = 0.005, 0.3  # of a hand farther out: at least [m], and of the handle's depth
 _SLIDES = (0.0, 0.025, -0.025)  # along the bar, from its middle [m]
 # From the TCP to the closed fingers' tips, half their width and half their thickness [m].
 _TIP = FINGER_BOXES[2][1][2] + FINGER_OFFSET - TCP_OFFSET
@@ -28,6 +40,8 @@ _HALF_THICKNESS = FINGER_BOXES[2][1][1]
 _PRESS = 0.0015  # how far the fingers are sent into what they push [m]
 _INSET = 0.022  # of a push on a door's inside, from its free edge [m]
 _TURNS = ((True, 1.0), (False, 1.0), (True, -1.0), (False, -1.0))  # flat and sign of a push
+_RADII = (1.0, 0.6, 0.35)  # where between hinge and free edge
+_BESIDE = 0.01  # how far what carries a handle sticks out beside it [m]
 # Where along the edge to push, as shares of half its length.
 _ALONG = (0.0, 0.5, -0.5, 0.8, -0.8)
 
@@ -39,15 +53,20 @@ def _grid(limit: float) -> Float[np.ndarray, "n"]:
 
 @dataclass(frozen=True)
 class Grip:
-    """Fingers around the bar of a handle, about whose long axis, the label's X, the hand may tilt.
+    """Fingers around a handle, about whose bar the hand may tilt.
 
-    Attributes: handle: `T_part_handle`; upright: `T_handle_tcp` without a tilt; opening: of the
-    gripper, closed on the bar [m].
+    Attributes: bar: `T_part_bar`, its X along the bar and its Y outwards; upright: `T_bar_tcp` without a
+    tilt; opening: of the gripper, closed on the bar [m].
     """
 
-    handle: Float[np.ndarray, "4 4"]
+    bar: Float[np.ndarray, "4 4"]
     upright: Float[np.ndarray, "4 4"]
     opening: float
+
+    @property
+    def opening_before(self) -> float:
+        """Of the gripper as it comes and when it has let go [m]."""
+        return min(self.opening + OPENING_MARGIN, MAX_OPENING)
 
     @property
     def tilts(self) -> Float[np.ndarray, "n"]:
@@ -57,18 +76,20 @@ class Grip:
     def tcp_poses(self, tilts: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k 4 4"]:
         """`T_part_tcp` at these tilts."""
         turns = np.stack([rotation_about(_X, float(tilt)) for tilt in tilts])
-        return self.handle @ compose(turns, np.zeros((len(turns), 3))) @ self.upright
+        return self.bar @ compose(turns, np.zeros((len(turns), 3))) @ self.upright
 
 
 def grip_now(
     part: PartEstimate, tcp_pose: Float[np.ndarray, "4 4"], opening: float
 ) -> tuple[Grip, float]:
     """How the hand holds the handle now, and its tilt [rad]."""
-    now = invert(part.handle_pose) @ tcp_pose
+    along = np.abs((part.handle_pose[:3, :3].T @ tcp_pose[:3, 0])[[0, 2]])
+    turn = _CROSSWISE if along[1] > along[0] else np.eye(4)
+    now = invert(part.handle_pose @ turn) @ tcp_pose
     # Without a tilt the hand looks along -Y.
     tilt = float(np.arctan2(-now[2, 2], -now[1, 2]))
     back = compose(rotation_about(_X, -tilt), np.zeros(3))
-    return Grip(part.handle.pose, back @ now, opening), tilt
+    return Grip(part.handle.pose @ turn, back @ now, opening), tilt
 
 
 @dataclass(frozen=True)
@@ -89,6 +110,7 @@ class Push:
     flat: bool
     sign: float = 1.0
     opening: float = 0.0
+    opening_before: float = 0.0
 
     @property
     def tilts(self) -> Float[np.ndarray, "n"]:
@@ -114,21 +136,31 @@ class Push:
 
 
 def grips(part: PartEstimate) -> Iterator[Grip]:
-    """Around the bar of the part's handle, its middle first; the hand comes along -Y of the label."""
-    width = float(min(part.handle.extents[1:]))
-    free = part.handle.extents[0] / 2 - _MIN_GRIP
-    for slide in _SLIDES:
-        if slide and abs(slide) > free:
-            continue
-        for sign in (1.0, -1.0):
-            x = np.array([sign, 0.0, 0.0])
-            approach = np.array([0.0, -1.0, 0.0])
-            rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
-            yield Grip(part.handle.pose, compose(rotation, slide * _X), width)
+    """Around the bar of the part's handle, its middle first; the hand comes along -Y of the label.
+
+    A knob or a short bar is taken across too.
+    """
+    along, depth, across = part.handle.extents
+    ways = [(np.eye(4), across, along)]
+    if along < _MAX_WIDTH:
+        ways.append((_CROSSWISE, along, across))
+    # It is held by its front too: there is more room behind the fingertips, and the hand can tilt more.
+    backs = (0.0, max(_BACK_SHARE * depth, _BACK))
+    for (turn, width, length), back in product(ways, backs):
+        free = length / 2 - _MIN_GRIP
+        for slide in _SLIDES:
+            if slide and (abs(slide) > free or back):
+                continue
+            for sign in (1.0, -1.0):
+                x = np.array([sign, 0.0, 0.0])
+                approach = np.array([0.0, -1.0, 0.0])
+                rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
+                upright = compose(rotation, slide * _X - back * approach)
+                yield Grip(part.handle.pose @ turn, upright, float(width))
 
 
-def shutting_pushes(part: PartEstimate) -> Iterator[Push]:
-    """On the front of the handle's bar."""
+def shutting_pushes(planner: MotionPlanner, part: PartEstimate) -> Iterator[Push]:
+    """On the front of the handle's bar; of a door also on its front."""
     handle = part.handle
     normal = handle.rotation[:, 1]
     axis = handle.rotation[:, 0]
@@ -141,43 +173,75 @@ def shutting_pushes(part: PartEstimate) -> Iterator[Push]:
     for flat, sign in _TURNS:
         for share in _ALONG if free else (0.0,):
             yield Push(front + share * free * axis, normal, axis, flat, sign)
+    if part.joint.kind == "hinge":
+        yield from _pushes_on_face(planner, part, normal)
 
 
 def opening_pushes(planner: MotionPlanner, part: PartEstimate) -> Iterator[Push]:
-    """On the inside of a door, near its free edge."""
+    """On the inside of a door."""
+    return _pushes_on_face(planner, part, -part.handle.rotation[:, 1])
+
+
+def _pushes_on_face(
+    planner: MotionPlanner, part: PartEstimate, normal: Float[np.ndarray, "3"]
+) -> Iterator[Push]:
+    """On the face of a door with this normal: near its free edge and nearer to the hinge, at the handle's
+    height and elsewhere."""
     low, high = part_bounds(planner, part)
-    normal = -part.handle.rotation[:, 1]
     axis = part.joint.axis
     radial = np.cross(axis, normal)
-    lever = part.handle.origin - part.joint.origin
-    radial *= np.sign(radial @ lever)
+    radial *= np.sign(radial @ (part.handle.origin - part.joint.origin))
     center, half = (low + high) / 2, (high - low) / 2
-    inside = _support(center, half, normal)
+    face = _board_face(planner, part, normal)
+    hinge = float(part.joint.origin @ radial)
     edge = _support(center, half, radial) - _INSET
-    along = center @ axis
-    point = inside * normal + edge * radial + along * axis
+    beside = float(np.abs(axis) @ half) - _INSET
+    middle = float(center @ axis)
+    heights = [float(part.handle.origin @ axis)] + [middle + share * beside for share in _ALONG]
     for flat, sign in _TURNS:
-        for share in _ALONG:
-            reach = share * (np.abs(axis) @ half) * axis
-            yield Push(point + reach, normal, axis, flat, sign)
+        for share in _RADII:
+            for height in heights:
+                away = hinge + share * (edge - hinge)
+                point = face * normal + away * radial + height * axis
+                yield Push(point, normal, axis, flat, sign)
+
+
+def _board_face(
+    planner: MotionPlanner, part: PartEstimate, normal: Float[np.ndarray, "3"]
+) -> float:
+    """How far the part reaches along a normal of its face, without its handle [m]."""
+    boxes = geom_boxes(planner, part)
+    handle = part.handle
+    center, half = boxes.mean(axis=1), (boxes[:, 1] - boxes[:, 0]) / 2
+    reach = half @ np.abs(handle.rotation) + np.abs((center - handle.origin) @ handle.rotation)
+    carries = (reach[:, [0, 2]] < handle.extents[[0, 2]] / 2 + _BESIDE).all(axis=1)
+    ends = center @ normal + half @ np.abs(normal)
+    return float(ends[~carries].max() if not carries.all() else ends.max())
 
 
 def part_bounds(
     planner: MotionPlanner, part: PartEstimate
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Low and high corner of the part's collision geometry in its own frame [m]."""
+    boxes = geom_boxes(planner, part)
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def geom_boxes(planner: MotionPlanner, part: PartEstimate) -> Float[np.ndarray, "n 2 3"]:
+    """Low and high corner of each of the part's collision geoms in its own frame [m]."""
     model = planner.scene.model
-    lows, highs = [], []
+    boxes = []
     for geom in np.flatnonzero(part.geoms):
+        if not model.geom_contype[geom] and not model.geom_conaffinity[geom]:
+            continue
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
         rotation = rotation.reshape(3, 3)
         box = model.geom_aabb[geom]
         center = model.geom_pos[geom] + rotation @ box[:3]
         half = np.abs(rotation) @ box[3:]
-        lows.append(center - half)
-        highs.append(center + half)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+        boxes.append((center - half, center + half))
+    return np.array(boxes)
 
 
 def _support(

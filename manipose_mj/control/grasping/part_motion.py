@@ -8,7 +8,7 @@ solutions, layer by layer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +21,8 @@ from manipose_mj.control.motion.trajectory import Timing, timed
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
 from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate
+from manipose_mj.mjcf.panda.reachability import is_reachable
+from manipose_mj.tasks.articulated.hand_places import chained
 
 # Between layers: of the joint [rad or m], of any arm joint [rad], of the tilt [rad].
 _LAYER = {"hinge": 0.12, "slide": 0.05}
@@ -32,13 +34,17 @@ _FINE = 6  # poses between layers
 _CHECK_EVERY = 2  # of those, for collision
 _DUPLICATE = 0.05  # solutions nearer than this are one [rad]
 _JERK = 0.25  # largest step of any arm joint between fine poses [rad]
+# Of the hand that comes to a handle.
+APPROACH = replace(CONTACT, arm=0.002, target=0.0)
+_PROMISE_LAYERS, _PROMISE_STEPS = 10, 2
 _TIMING = Timing(speed=0.35, linear_speed=0.12)
 
 
 class Hold(Protocol):
     """A way to touch a part.
 
-    Attributes: tilts: of the hand that it allows [rad]; opening: of the gripper meanwhile [m].
+    Attributes: tilts: of the hand that it allows [rad]; opening: of the gripper meanwhile [m]; opening_before: of
+    the gripper as it comes [m].
     """
 
     @property
@@ -46,6 +52,9 @@ class Hold(Protocol):
 
     @property
     def opening(self) -> float: ...
+
+    @property
+    def opening_before(self) -> float: ...
 
     def tcp_poses(self, tilts: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k 4 4"]:
         """`T_part_tcp` at these tilts."""
@@ -128,6 +137,16 @@ def find_way(
     return way if isinstance(way, PartWay) else None
 
 
+def promise(part: PartEstimate, hold: Hold, opening: float) -> float:
+    """How much of the way to `opening` the table of reachability has poses for; cheap, blind to collisions."""
+    tilts = hold.tilts
+    local = hold.tcp_poses(tilts)
+    openings = np.linspace(part.opening, opening, _PROMISE_LAYERS)
+    moved = np.stack([part.base_pose @ joint_motion(part, float(q)) for q in openings])
+    reached = chained(is_reachable(moved[:, None] @ local[None])[None], _PROMISE_STEPS)
+    return float(reached[0].any(axis=1).mean() + 0.01 * reached[0].mean())
+
+
 def _layers(
     planner: MotionPlanner,
     part: PartEstimate,
@@ -147,12 +166,17 @@ def _layers(
     solved &= least > MIN_DEXTERITY**2
     layers = []
     touching = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
+    coming = CollisionQuery(APPROACH, opening=hold.opening_before, target=part.geoms)
     for k, q in enumerate(openings):
         own, angles = [], []
         moved_planner = planner.within(with_part_at(planner.scene, part, float(q)))
         for j, tilt in enumerate(tilts):
             column = k * len(tilts) + j
             for s in _distinct(joints[:, column], solved[:, column]):
+                # The hand comes with its fingers open and has to fit around what it takes.
+                opens = k == 0 and hold.opening_before > hold.opening
+                if opens and moved_planner.collides(joints[s, column], coming):
+                    continue
                 if not moved_planner.collides(joints[s, column], touching):
                     own.append(joints[s, column])
                     angles.append(tilt)

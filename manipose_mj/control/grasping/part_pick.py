@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.handle_grasps import (
     Push,
     grip_now,
@@ -17,23 +16,23 @@ from manipose_mj.control.grasping.handle_grasps import (
     shifted,
     shutting_pushes,
 )
-from manipose_mj.control.grasping.part_motion import PartWay, find_way
+from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way, promise
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
 from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.mjcf.panda.robot import MAX_OPENING
 
 _STANDOFFS = (0.10, 0.07, 0.05)  # from which a handle is approached [m]
 # From which a surface is approached: off it, and back along the hand [m].
 _PUSH_STANDOFFS = ((0.05, 0.0), (0.03, 0.0), (0.02, 0.12), (0.02, 0.07))
-_APPROACH = replace(CONTACT, arm=0.002, target=0.0)
 # A grip that moves a part by less than this share of what is asked is of no use; a door is pushed
 # the rest of the way.
-MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
+_MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
+_AJAR = 0.5  # of a door, enough to reach behind it [rad]
 _STEP_BACK = 6  # poses of a way
+_MAX_PUSHES = 24  # for which a way is looked for
 _MAX_TRIES = 12  # complete ways for which an approach is looked for
 
 
@@ -72,22 +71,22 @@ def grip_handle(
     Raises:
       StageFailure: None moves it by a fair share of the way.
     """
-    least = MIN_SHARE[part.joint.kind]
+    anywhere = opening is None
     if opening is None:
-        least, (low, high) = 0.0, part.joint.range
+        low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways = [
         way
         for hold in grips(part)
-        if (way := find_way(planner, part, hold, opening, near=estimate.joints)) is not None
-        and share_of(way, part, opening) >= least
-        and _can_get_off(planner, part, way)
+        if (led := find_way(planner, part, hold, opening, near=estimate.joints)) is not None
+        and (way := ending_free(planner, part, led)) is not None
+        and (anywhere or leads_enough(way, part, opening))
     ]
     ways.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
     # At low handles the wrist is within millimetres of the table: only if nothing else will do.
     for tight in (False, True):
         for way in ways[:_MAX_TRIES]:
-            wide = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
+            wide = way.hold.opening_before
             approach = _backwards(planner, part, way.joints[0], wide, _STANDOFFS)
             if approach is None:
                 continue
@@ -130,7 +129,9 @@ def push_part(
       StageFailure: There is none.
     """
     complete = tried = 0
-    for hold in _pushes(planner, part, opening):
+    holds = list(_pushes(planner, part, opening))
+    holds.sort(key=lambda hold: -promise(part, hold, opening))
+    for hold in holds[:_MAX_PUSHES]:
         tried += 1
         way = find_way(planner, part, hold, opening, near=estimate.joints)
         if way is None or share_of(way, part, opening) < 0.999:
@@ -170,13 +171,21 @@ def off_surface(
 
 def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Iterator[Push]:
     if opening < part.opening:
-        return shutting_pushes(part)
+        return shutting_pushes(planner, part)
     return opening_pushes(planner, part)
 
 
 def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:
     """How much of the way to `opening` it goes."""
     return float((way.openings[-1] - part.opening) / (opening - part.opening))
+
+
+def leads_enough(way: PartWay, part: PartEstimate, opening: float) -> bool:
+    """Whether a grip's way is of use towards `opening`: a push may do the rest of a door's."""
+    share = share_of(way, part, opening)
+    if share >= _MIN_SHARE[part.joint.kind]:
+        return True
+    return part.joint.kind == "hinge" and float(way.openings[-1] - part.opening) >= _AJAR
 
 
 def _turned(way: PartWay) -> float:
@@ -186,7 +195,7 @@ def _turned(way: PartWay) -> float:
 
 def _can_get_off(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
     """Whether the open hand can back off from the handle at the end."""
-    opening = min(way.hold.opening + OPENING_MARGIN, MAX_OPENING)
+    opening = way.hold.opening_before
     at_end = planner.within(with_part_at(planner.scene, part, float(way.openings[-1])))
     back = _backwards(at_end, part, way.joints[-1], opening, (HANDLE_RETREATS[-1],))
     return back is not None
@@ -201,7 +210,7 @@ def _backwards(
 ) -> Float[np.ndarray, "t 7"] | None:
     """A straight approach along the hand's own axis, which ends at `joints`."""
     touched = frozenset({planner.body_name(part.body)})
-    query = CollisionQuery(_APPROACH, opening=opening, target=part.geoms)
+    query = CollisionQuery(APPROACH, opening=opening, target=part.geoms)
     for standoff in standoffs:
         goal = planner.backed_off(joints, standoff)
         back = planner.line(joints, goal, query, touched=touched)

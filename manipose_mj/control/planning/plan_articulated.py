@@ -29,6 +29,7 @@ PartGoal = InsideGoal | TakenOutGoal | OpenGoal | ShutGoal
 # How far to open, of the joint's range: all the way would ram the stop.
 OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
+AJAR = 0.3  # from which on a door can be pushed from inside [rad]
 SHUT_ENOUGH = 0.005  # of a joint [m or rad]
 CAVITY_MARGIN = np.array([0.010, 0.010, 0.004])  # in all, along each axis [m]
 # Where in the cavity, as a share of the free way from its middle to its front: the hand that sets
@@ -64,11 +65,22 @@ def part_goal_plans(
     low, high = part.joint.range
     if isinstance(goal, ShutGoal):
         shut = goal.part not in opened and part.opening <= low + SHUT_ENOUGH
-        yield () if shut else (Step("move_to", goal.part, opening=low),)
+        if shut:
+            yield ()
+            return
+        yield (Step("move_to", goal.part, opening=low),)
+        # What no push shuts is led by its handle.
+        yield _led(goal.part, low)
     elif isinstance(goal, OpenGoal):
         share = max(OPEN_SHARE, min((1 + goal.fraction) / 2, 1.0))
         is_open = part.opening >= low + goal.fraction * (high - low)
-        yield () if is_open else _open(part, low + share * (high - low))
+        if is_open:
+            yield ()
+            return
+        wide_open = low + share * (high - low)
+        yield _open(part, wide_open)
+        if part.joint.kind == "hinge" and part.opening > low + AJAR:
+            yield (Step("move_to", goal.part, opening=wide_open),)
     elif is_reached(goal, estimate):
         yield ()
     else:
@@ -111,13 +123,19 @@ def _plans_through(
 
 def _open(part: PartEstimate, opening: float) -> Plan:
     """By the handle; a door that the hand cannot lead all the way is then pushed on from inside."""
-    name = part.name
-    plan: Plan = (
+    plan = _led(part.name, opening)
+    if part.joint.kind == "slide":
+        return plan
+    return (*plan, Step("move_to", part.name, opening=opening))
+
+
+def _led(name: str, opening: float) -> Plan:
+    """By the handle."""
+    return (
         Step("grasp_at", name),
         Step("move_to", name, opening=opening),
         Step("release", name),
     )
-    return plan if part.joint.kind == "slide" else (*plan, Step("move_to", name, opening=opening))
 
 
 def lies_inside(obj: ObjectEstimate, part: PartEstimate) -> bool:

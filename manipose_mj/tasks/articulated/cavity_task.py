@@ -10,8 +10,9 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.cavity_placement import CavityPlacement, Placement
-from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion, Standing, side
+from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion
 from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
+from manipose_mj.tasks.articulated.placement import Standing, side
 from manipose_mj.tasks.core.config import EnvConfig, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion, Standing
+from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion
 from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
+from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
@@ -67,4 +68,5 @@ class OpenClose(FurnitureTask):
             if config.requested == "open"
             else ShutGoal(part, config.fraction)
         )
-        return EpisodeStart(goals=(goal,), furniture=(self.pieces.sample(rng, 0, opening),))
+        furniture, mount = self.pieces.sample(rng, 0, opening)
+        return EpisodeStart(goals=(goal,), furniture=(furniture,), mount=mount)

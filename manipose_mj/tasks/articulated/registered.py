@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import radians
+from dataclasses import dataclass, replace
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.tasks.articulated.furniture import Standing
 from manipose_mj.tasks.articulated.object_draw import (
     RequestedFurniture,
     furniture_alone,
@@ -14,6 +12,7 @@ from manipose_mj.tasks.articulated.object_draw import (
 )
 from manipose_mj.tasks.articulated.open_close import OpenClose, OpenCloseConfig
 from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part
+from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.articulated.store import Store, StoreConfig
 from manipose_mj.tasks.articulated.take_out import TakeOut, TakeOutConfig
 from manipose_mj.tasks.core.config import EnvConfig
@@ -40,7 +39,8 @@ _CANS_IN_DRAWERS = RequestedFurniture(
 )
 def store_chips_can_middle_drawer(env_config: EnvConfig, objects: SceneObjects) -> Store:
     """Store the chips can in the middle drawer: open it, lay the can inside, shut it."""
-    return Store(*_cavity_scene(objects), env_config)
+    config = StoreConfig(standing=OPENABLES["middle_drawer"].standing)
+    return Store(*_cavity_scene(objects), env_config, config)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Openable:
     Attributes:
       phrase: What it is, for descriptions.
       requested: The furniture and its parts.
-      standing: Where the furniture stands.
+      standing: Where the furniture stands where things are put into it or taken out.
       start_open: How far open it is when it is to be shut, of its range.
       shut: By which fraction of its range it must be shut after something was stored or taken out;
         None: to within the tolerance.
@@ -58,10 +58,14 @@ class Openable:
 
     phrase: str
     requested: RequestedFurniture
-    standing: Standing = field(default_factory=Standing)
+    standing: Standing = Standing(objects=True)
     start_open: tuple[float, float] = (0.6, 1.0)
     shut: float | None = None
 
+
+# Where the hand gets at the handle and into the cavity, with the objects to the right.
+_BESIDE = Standing((0.73, 0.78), (0.06, 0.20), turn=(-0.3, 0.04), objects=True)
+_BEFORE = Standing((0.67, 0.74), (-0.22, -0.07), turn=(-0.03, 0.32), objects=True)
 
 OPENABLES: dict[str, Openable] = {
     **{
@@ -69,7 +73,7 @@ OPENABLES: dict[str, Openable] = {
             f"the {level} drawer of a cabinet",
             RequestedFurniture(_ANY_CABINET, PartChoice(("drawer",), level)),
             # The hand gets at a handle from the front only with room below.
-            Standing(plinth=0.15 if level == "bottom" else 0.0),
+            replace(_BESIDE, plinth=(0.15, 0.15) if level == "bottom" else (0.0, 0.0)),
             # Wide open, the top drawer would be where the hand is at home.
             start_open=(0.5, 0.7),
         )
@@ -78,28 +82,28 @@ OPENABLES: dict[str, Openable] = {
     "cabinet_door": Openable(
         "a door of a cabinet",
         RequestedFurniture(_ANY_CABINET, PartChoice(("door",))),
-        Standing(x=(0.66, 0.72), y=(-0.15, -0.05)),
+        _BEFORE,
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "microwave": Openable(
         "a microwave",
         RequestedFurniture(("microwave",), PartChoice(("door", "flap"))),
-        Standing(x=(0.66, 0.72), y=(-0.15, -0.05), plinth=0.10),
+        replace(_BEFORE, plinth=(0.10, 0.10)),
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "oven": Openable(
         "an oven, whose door is hinged at the bottom",
         RequestedFurniture(("oven",), PartChoice(("flap", "door"))),
-        Standing(x=(0.68, 0.72), y=(-0.05, 0.05), yaw=radians(6), plinth=0.12),
+        replace(_BEFORE, bearing=(-0.07, 0.07), turn=(-0.17, 0.17), plinth=(0.12, 0.12)),
         shut=0.95,
     ),
 }
 
 
 def _open(part: Openable) -> DrawnTaskFactory:
-    factory = _moving(part, OpenCloseConfig(requested="open", standing=part.standing))
+    factory = _moving(part, OpenCloseConfig(requested="open"))
     factory.__doc__ = f"""Open {part.phrase}, by nine tenths of its range or more.
 
     It is shut at first. Which piece and which of its parts changes from episode to episode.
@@ -108,7 +112,7 @@ def _open(part: Openable) -> DrawnTaskFactory:
 
 
 def _close(part: Openable) -> DrawnTaskFactory:
-    config = OpenCloseConfig(requested="shut", standing=part.standing, start_open=part.start_open)
+    config = OpenCloseConfig(requested="shut", start_open=part.start_open)
     factory = _moving(part, config)
     factory.__doc__ = f"""Shut {part.phrase}, by nine tenths of its range or more.
 

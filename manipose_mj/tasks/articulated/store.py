@@ -13,7 +13,7 @@ import numpy as np
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.cavity_placement import starts
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
-from manipose_mj.tasks.articulated.furniture import Standing
+from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
@@ -29,7 +29,7 @@ class StoreConfig(TaskConfig):
     in the end; None: to within the tolerance, as a drawer."""
 
     horizon: float = 90.0
-    standing: Standing = Standing()
+    standing: Standing = Standing(objects=True)
     x_range: tuple[float, float] = (0.32, 0.48)
     y_range: tuple[float, float] = (-0.42, -0.28)
     max_fillers: int = 0
@@ -67,7 +67,8 @@ class Store(CavityTask):
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
-        furniture, asset = self.pieces.sample(rng, 0), self.pool.entities[0].asset
+        furniture, mount = self.pieces.sample(rng, 0)
+        asset = self.pool.entities[0].asset
         possible = starts(asset)
         rest = possible[rng.randint(len(possible))]
         xy = self.sample_place(rng, config.x_range, config.y_range)
@@ -79,4 +80,5 @@ class Store(CavityTask):
             goals=(InsideGoal("object", part), ShutGoal(part, config.shut)),
             objects=placed_objects(pose, fillers, cavity),
             furniture=(furniture,),
+            mount=mount,
         )

@@ -11,7 +11,7 @@ from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.mjcf.markers.goal_area import GoalArea
 from manipose_mj.poses import compose
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
-from manipose_mj.tasks.articulated.furniture import Standing
+from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart
@@ -28,7 +28,7 @@ class TakeOutConfig(TaskConfig):
     end; None: to within the tolerance, as a drawer."""
 
     horizon: float = 90.0
-    standing: Standing = Standing()
+    standing: Standing = Standing(objects=True)
     x_range: tuple[float, float] = (0.36, 0.46)
     y_range: tuple[float, float] = (-0.40, -0.30)
     area: tuple[float, float] = (0.08, 0.08)
@@ -75,7 +75,7 @@ class TakeOut(CavityTask):
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
-        furniture = self.pieces.sample(rng, 0)
+        furniture, mount = self.pieces.sample(rng, 0)
         center = self.sample_place(rng, config.x_range, config.y_range)
         placement, inside = self.placement.inside(rng, front=config.front, room=config.room)
         fillers = self.sample_fillers(rng, placement)
@@ -88,6 +88,7 @@ class TakeOut(CavityTask):
             ),
             objects=placed_objects(cavity @ inside, fillers, cavity),
             furniture=(furniture,),
+            mount=mount,
             # The middle of the goal area, Z up.
             fixtures={"goal": compose(np.eye(3), np.array([*center, 0.0]))},
         )

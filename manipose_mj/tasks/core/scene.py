@@ -62,18 +62,17 @@ class Scene:
         self.instances.update({e.mjcf_model.model: e for e in self.objects.entities})
         return self.objects
 
-    def add_furniture(self, assets: Sequence[Asset], *, plinth: float = 0.0) -> FurniturePool:
+    def add_furniture(self, assets: Sequence[Asset]) -> FurniturePool:
         """Add the articulated objects that episodes may use; once.
 
         Args:
           assets: Articulated ones.
-          plinth: Height of the plinth under each [m].
 
         Raises:
           InputError: There is none, or one of them is rigid.
         """
         assert self.furniture is None, "the scene has its furniture already"
-        self.furniture = FurniturePool(assets, self.arena, plinth=plinth)
+        self.furniture = FurniturePool(assets, self.arena)
         self.instances.update({e.mjcf_model.model: e for e in self.furniture.entities})
         return self.furniture
 
@@ -105,10 +104,16 @@ class Scene:
 
         `physics` is not brought up to date: call `forward` after it, with static bodies awake.
         """
+        mount = start.mount
+        self.arena.stand_robot(
+            physics, mount.height, table=mount.table, side_table=mount.side_table
+        )
         if self.furniture is not None:
             self.furniture.park(physics)
             for piece in start.furniture:
-                self.furniture.place(physics, piece.index, piece.position, piece.quaternion)
+                self.furniture.place(
+                    physics, piece.index, piece.position, piece.quaternion, raised=piece.raised
+                )
                 for part, opening in piece.openings.items():
                     self.furniture.open(physics, piece.index, part, opening)
         if self.objects is not None:

@@ -9,11 +9,28 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.arena import TABLE_HEIGHT
 from manipose_mj.tasks.goals import Goal
 
 
 class NoStartError(InputError):
     """No start can be drawn with the objects of a scene; with others there may be one."""
+
+
+@dataclass(frozen=True)
+class Mount:
+    """What the robot stands on; its base is the world's origin either way.
+
+    Attributes:
+      table: Whether it stands at the edge of the table, whose top is the plane z = 0; on a pedestal
+        otherwise, and there is no table.
+      height: Of the robot's base above the floor [m].
+      side_table: Beside the pedestal, as high as the base: 1 to the left, -1 to the right, 0 none.
+    """
+
+    table: bool = True
+    height: float = TABLE_HEIGHT
+    side_table: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -38,12 +55,14 @@ class PlacedFurniture:
       position: `(3,)`, of its frame in the world [m].
       quaternion: `(4,)`, `wxyz`.
       openings: Joint positions [m or rad] by the names of parts; all others are shut.
+      raised: Whether it stands on a plinth, which reaches down to the floor.
     """
 
     index: int
     position: Float[np.ndarray, "3"]
     quaternion: Float[np.ndarray, "4"]
     openings: Mapping[str, float] = field(default_factory=dict)
+    raised: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,6 +88,7 @@ class EpisodeStart:
       furniture: Articulated objects in play.
       fixtures: `T_world_fixture` of the scene's fixtures, goal markers among them, by name; those not
         named are out of sight.
+      mount: What the robot stands on.
       model: Changes of the model.
       noise_seed: Of the sensors.
     """
@@ -77,5 +97,6 @@ class EpisodeStart:
     objects: Mapping[str, PlacedObject] = field(default_factory=dict)
     furniture: tuple[PlacedFurniture, ...] = ()
     fixtures: Mapping[str, Float[np.ndarray, "4 4"]] = field(default_factory=dict)
+    mount: Mount = Mount()
     model: ModelChanges = ModelChanges()
     noise_seed: int = 0

@@ -17,6 +17,10 @@ _PARKED = np.array([0.0, 8.0, 60.0])
 _PARKING_STEP = np.array([3.0, 0.0, 0.0])
 # By how much the plinth stays behind the front, where doors swing and handles are [m].
 _PLINTH_INSET = 0.09
+_PLINTH = "plinth"
+# It goes through the table and the floor, which hide what is too long of it [m].
+_PLINTH_DEPTH = 2.0
+_AWAY = np.array([0.0, 0.0, -30.0])  # of a plinth that is not used
 _PLINTH_COLOUR = (0.80, 0.79, 0.77, 1.0)
 
 
@@ -28,15 +32,12 @@ class FurniturePool:
         whatever its category is.
     """
 
-    def __init__(
-        self, assets: Sequence[Asset], arena: composer.Arena, *, plinth: float = 0.0
-    ) -> None:
+    def __init__(self, assets: Sequence[Asset], arena: composer.Arena) -> None:
         """Attach an entity for each asset.
 
         Args:
           assets: Articulated ones.
           arena: Not compiled yet.
-          plinth: Height of the plinth under each [m].
 
         Raises:
           InputError: There is none, or one of them is rigid.
@@ -48,8 +49,7 @@ class FurniturePool:
             for i, asset in enumerate(assets)
         )
         for index, entity in enumerate(self.entities):
-            if plinth:
-                _add_plinth(entity, plinth)
+            _add_plinth(entity)
             arena.attach(entity).pos = _PARKED + index * _PARKING_STEP
 
     def park(self, physics: mjcf.Physics) -> None:
@@ -67,10 +67,14 @@ class FurniturePool:
         index: int,
         position: Float[np.ndarray, "3"],
         quaternion: Float[np.ndarray, "4"],
+        *,
+        raised: bool = False,
     ) -> None:
-        """Stand one of them somewhere: position [m], `wxyz` quaternion."""
-        frame = physics.bind(mjcf.get_attachment_frame(self.entities[index].mjcf_model))
+        """Stand one of them somewhere: position [m], `wxyz` quaternion; raised: on its plinth."""
+        model = self.entities[index].mjcf_model
+        frame = physics.bind(mjcf.get_attachment_frame(model))
         frame.pos, frame.quat = position, quaternion
+        physics.bind(model.find("body", _PLINTH)).pos = np.zeros(3) if raised else _AWAY
 
     def open(self, physics: mjcf.Physics, index: int, part: str, opening: float) -> None:
         """Set the joint of a part [m or rad]."""
@@ -83,11 +87,13 @@ def box_of(asset: Asset) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]
     return asset.label.origin - half, asset.label.origin + half
 
 
-def _add_plinth(entity: ArticulatedObject, height: float) -> None:
+def _add_plinth(entity: ArticulatedObject) -> None:
     low, high = box_of(entity.asset)
     low = low + [_PLINTH_INSET, 0.01, 0.0]
     high = high - [0.01, 0.01, 0.0]
-    entity.mjcf_model.worldbody.add(
-        "geom", name="plinth", type="box", rgba=_PLINTH_COLOUR,
-        pos=[*((low + high) / 2)[:2], -height / 2], size=[*((high - low) / 2)[:2], height / 2],
+    body = entity.mjcf_model.worldbody.add("body", name=_PLINTH, pos=_AWAY)
+    body.add(
+        "geom", name=_PLINTH, type="box", rgba=_PLINTH_COLOUR,
+        pos=[*((low + high) / 2)[:2], low[2] - _PLINTH_DEPTH / 2],
+        size=[*((high - low) / 2)[:2], _PLINTH_DEPTH / 2],
     )  # fmt: skip

@@ -89,7 +89,7 @@ def test_pushes_press_from_the_side_that_moves_the_part(scene):
     planner, _, part = scene
     low, high = part.joint.range
     half_open = replace(part, opening=0.5 * (low + high))
-    pairs = ((shutting_pushes(part), -1.0), (opening_pushes(planner, half_open), 1.0))
+    pairs = ((shutting_pushes(planner, part), -1.0), (opening_pushes(planner, half_open), 1.0))
     for pushes, sign in pairs:
         for push in list(pushes)[:6]:
             assert isinstance(push, Push)

@@ -1,0 +1,171 @@
+"""Every handled drawer and door of some furniture, opened and shut by the baseline with true poses, part by part.
+
+    python benchmarks/furniture_table.py [--assets DIR] [--only NAME ...] [--skip NAME ...] [--seeds 0 1]
+        [--parts NAME ...] [--verbs open close] [--jobs 2]
+
+Without a folder: the catalogue's test cabinets, microwaves and ovens. One line a part and verb: how many of the
+seeds succeeded, and why the others did not. A part without a handle is left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from manipose_mj.console.process import one_thread_per_process
+
+one_thread_per_process()
+
+from manipose_mj.assets import catalogue  # noqa: E402
+from manipose_mj.assets.asset import Asset, MovingPart  # noqa: E402
+from manipose_mj.assets.asset_json import read_asset  # noqa: E402
+from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
+from manipose_mj.control.grasping.candidates import MIN_CLEARANCE  # noqa: E402
+from manipose_mj.evaluation.episode import run_episode  # noqa: E402
+from manipose_mj.mjcf.panda.robot import MAX_OPENING  # noqa: E402
+from manipose_mj.tasks.articulated.object_draw import Wanted, furniture_alone  # noqa: E402
+from manipose_mj.tasks.articulated.open_close import OpenClose, OpenCloseConfig  # noqa: E402
+from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of  # noqa: E402
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec  # noqa: E402
+from manipose_mj.tasks.core.registry import DrawnTaskFactory, register_task  # noqa: E402
+from manipose_mj.tasks.core.scene_objects import SceneObjects  # noqa: E402
+
+_FURNITURE = ("cabinet", "microwave", "oven")
+_SPLIT = "test"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One part of one asset, to be opened or to be shut, with every seed."""
+
+    folder: Path | None  # None: of the catalogue
+    asset: str
+    part: str
+    verb: str
+    seeds: tuple[int, ...]
+
+    def load(self) -> Asset:
+        """The asset."""
+        if self.folder is not None:
+            return read_asset(self.folder)
+        category, index = self.asset.rsplit("_", 1)
+        return catalogue.load(category, int(index))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of a case: of each seed an empty string, or why not."""
+
+    case: Case
+    kind: str
+    width: float
+    reasons: tuple[str, ...]
+    seconds: float
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--assets", type=Path, help="folder of asset folders")
+    parser.add_argument("--only", nargs="+", default=[], help="names of assets")
+    parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")
+    parser.add_argument("--parts", nargs="+", default=[], help="names of parts")
+    parser.add_argument("--verbs", nargs="+", default=["open", "close"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    cases = [
+        Case(folder, asset.name, part.name, verb, tuple(options.seeds))
+        for folder, asset in _assets(options.assets)
+        if (not options.only or asset.name in options.only) and asset.name not in options.skip
+        for part in asset.parts
+        if part.handle is not None and (not options.parts or part.name in options.parts)
+        for verb in options.verbs
+    ]
+    rows = []
+    with multiprocessing.get_context("spawn").Pool(options.jobs, maxtasksperchild=8) as pool:
+        for row in pool.imap(run, cases):
+            rows.append(row)
+            print(_line(row), flush=True)
+    for verb in options.verbs:
+        reasons = [r for row in rows if row.case.verb == verb for r in row.reasons]
+        fits = [r for row in rows if row.case.verb == verb and _fits(row) for r in row.reasons]
+        done, able = reasons.count(""), fits.count("")
+        print(f"{verb}: {done} of {len(reasons)}; of handles that fit: {able} of {len(fits)}")
+
+
+def run(case: Case) -> Row:
+    """Every seed of a case."""
+    started = time.perf_counter()
+    asset = case.load()
+    part = asset.part(case.part)
+    config = EnvConfig(
+        f"furniture/{case.verb}_{kind_of(part)}", obs_mode="state", objects=(str(asset.folder),)
+    )
+    reasons = []
+    for seed in case.seeds:
+        spec = EpisodeSpec(seed, furniture=asset.name, part=part.name)
+        result, _ = run_episode(config, spec)
+        done = result.success_at_end
+        reasons.append("" if done else f"{result.failure}: {result.reason}")
+    seconds = time.perf_counter() - started
+    return Row(case, kind_of(part), _width(part), tuple(reasons), seconds)
+
+
+def _moving(requested: Literal["open", "shut"]) -> DrawnTaskFactory:
+    def factory(env_config: EnvConfig, objects: SceneObjects) -> OpenClose:
+        (asset,) = objects.assets
+        assert objects.part is not None
+        config = OpenCloseConfig(requested=requested)
+        return OpenClose(asset, asset.part(objects.part), env_config, config)
+
+    factory.__doc__ = "Any part of a kind."
+    return factory
+
+
+for _kind in ("drawer", "door", "flap"):
+    _draws = furniture_alone(Wanted(_FURNITURE, PartChoice((_kind,))))
+    register_task("furniture", f"open_{_kind}", draws=_draws)(_moving("open"))
+    register_task("furniture", f"close_{_kind}", draws=_draws)(_moving("shut"))
+
+
+def _assets(folder: Path | None) -> Iterator[tuple[Path | None, Asset]]:
+    if folder is None:
+        for category in _FURNITURE:
+            row = CATALOGUE[category]
+            for index in range(row.instances):
+                if row.split(index) == _SPLIT:
+                    yield None, catalogue.load(category, index)
+        return
+    for path in sorted(folder.iterdir()):
+        if (path / "asset.json").is_file() and (asset := read_asset(path)).kind == "articulated":
+            yield path, asset
+
+
+def _width(part: MovingPart) -> float:
+    """Of the handle's bar, between the fingers [m]."""
+    assert part.handle is not None
+    return float(min(part.handle.extents[1:]))
+
+
+def _fits(row: Row) -> bool:
+    return row.width <= MAX_OPENING - MIN_CLEARANCE
+
+
+def _line(row: Row) -> str:
+    case, done = row.case, row.reasons.count("")
+    why = "; ".join(dict.fromkeys(r for r in row.reasons if r))
+    wide = "" if _fits(row) else f" [{1000 * row.width:.0f} mm wide]"
+    return (
+        f"{case.verb:<6}{case.asset:<16}{case.part:<16}{row.kind:<7} "
+        f"{done}/{len(row.reasons)} {row.seconds:6.0f} s  {why}{wide}"
+    )
+
+
+if __name__ == "__main__":
+    main()
