@@ -31,7 +31,8 @@ _MIN_GRIP = 0.012  # of the bar beyond the middle of the fingers [m]
 _MAX_WIDTH = MAX_OPENING - 0.004  # of what the gripper takes [m]
 # Of the bar's frame: about the handle's Y, so that the hand may tilt about the handle's Z.
 _CROSSWISE = compose(rotation_about(np.array([0.0, 1.0, 0.0]), -np.pi / 2), np.zeros(3))
-_BACK, _BACK_SHARE = 0.005, 0.3  # of a hand farther out: at least [m], and of the handle's depth
+# Of a hand farther out: at least [m], and of the depth of a bar and of a knob.
+_BACK, _BACK_SHARE, _KNOB_SHARE = 0.004, 0.25, 0.5
 _SLIDES = (0.0, 0.025, -0.025)  # along the bar, from its middle [m]
 # From the TCP to the closed fingers' tips, half their width and half their thickness [m].
 _TIP = FINGER_BOXES[2][1][2] + FINGER_OFFSET - TCP_OFFSET
@@ -141,11 +142,12 @@ def grips(part: PartEstimate) -> Iterator[Grip]:
     A knob or a short bar is taken across too.
     """
     along, depth, across = part.handle.extents
+    knob = along < _MAX_WIDTH
     ways = [(np.eye(4), across, along)]
-    if along < _MAX_WIDTH:
+    if knob:
         ways.append((_CROSSWISE, along, across))
     # It is held by its front too: there is more room behind the fingertips, and the hand can tilt more.
-    backs = (0.0, max(_BACK_SHARE * depth, _BACK))
+    backs = (0.0, max((_KNOB_SHARE if knob else _BACK_SHARE) * depth, _BACK))
     for (turn, width, length), back in product(ways, backs):
         free = length / 2 - _MIN_GRIP
         for slide in _SLIDES:

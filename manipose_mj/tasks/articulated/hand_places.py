@@ -16,7 +16,8 @@ from manipose_mj.tasks.articulated.part_shape import PartShape
 _TILT_STEP = radians(15)
 _GRIP_TILT, _PUSH_TILT = radians(75), radians(90)
 _INSET = 0.022  # of a push on a door's inside, from its free edge [m]
-_BACK = 0.004  # of a grip, which need not be in the middle of the bar [m]
+# Of a grip, by the front of what it holds: at least [m], and of the depth of a bar and of a knob.
+_BACK, _BACK_SHARE, _KNOB_SHARE = 0.004, 0.25, 0.5
 _TIP = 0.009  # from the TCP to the closed fingers' tips [m]
 _SHARES = (1.0, 0.6, 0.35)  # of a door's radius, where it may be pushed
 
@@ -39,10 +40,11 @@ def around_the_bar(part: MovingPart) -> tuple[HandPlaces, ...]:
     handle = part.handle
     assert handle is not None
     x, out, z = handle.rotation.T
-    along, _, across = handle.extents
+    along, depth, across = handle.extents
+    back = max(_BACK, (_KNOB_SHARE if along < MAX_OPENING else _BACK_SHARE) * depth)
     bars = [(x, across), (z, along)] if along < MAX_OPENING else [(x, across)]
     return tuple(
-        HandPlaces(_tilted(handle.origin, out, bar, bar, _GRIP_TILT, _BACK), float(width))
+        HandPlaces(_tilted(handle.origin, out, bar, bar, _GRIP_TILT, back), float(width))
         for bar, width in bars
     )
 

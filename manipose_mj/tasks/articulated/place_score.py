@@ -36,7 +36,7 @@ _STEPS = 2  # tilts between layers
 _AJAR = 0.5  # of a door, to be pushed on from inside [rad]
 _EASE = 0.1  # how much the share of tilts counts that the arm can choose from
 # Points of the hand in the TCP's frame, and how far each has to be from furniture [m].
-_PALM = [(0.0, y, z, 0.024) for y in (-0.085, 0.0, 0.085) for z in (-0.06, -0.09)]
+_PALM = [(0.0, y, z, 0.020) for y in (-0.085, 0.0, 0.085) for z in (-0.06, -0.09)]
 _HAND = np.array([*_PALM, (0.0, 0.0, -0.15, 0.055), (0.0, 0.0, -0.21, 0.065)])
 # Of a finger's outer side: from the pad's inner side, from the TCP along the approach [m].
 _FINGER = ((0.0145, 0.008), (0.0145, -0.009), (0.0230, -0.010), (0.0258, -0.045))
