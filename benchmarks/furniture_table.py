@@ -28,7 +28,7 @@ from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
 from manipose_mj.control.grasping.candidates import MIN_CLEARANCE  # noqa: E402
 from manipose_mj.evaluation.episode import run_episode  # noqa: E402
 from manipose_mj.mjcf.panda.robot import MAX_OPENING  # noqa: E402
-from manipose_mj.tasks.articulated.object_draw import Wanted, furniture_alone  # noqa: E402
+from manipose_mj.tasks.articulated.object_draw import RequestedFurniture, furniture_alone  # noqa: E402
 from manipose_mj.tasks.articulated.open_close import OpenClose, OpenCloseConfig  # noqa: E402
 from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of  # noqa: E402
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec  # noqa: E402
@@ -129,7 +129,7 @@ def _moving(requested: Literal["open", "shut"]) -> DrawnTaskFactory:
 
 
 for _kind in ("drawer", "door", "flap"):
-    _draws = furniture_alone(Wanted(_FURNITURE, PartChoice((_kind,))))
+    _draws = furniture_alone(RequestedFurniture(_FURNITURE, PartChoice((_kind,))))
     register_task("furniture", f"open_{_kind}", draws=_draws)(_moving("open"))
     register_task("furniture", f"close_{_kind}", draws=_draws)(_moving("shut"))
 
