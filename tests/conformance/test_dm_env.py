@@ -133,7 +133,7 @@ def test_a_diverging_simulation_ends_its_episode_and_leaves_nothing_to_the_next(
 
 
 def test_a_start_that_diverges_is_followed_by_another(monkeypatch, caplog):
-    environment, sound = (load(*TASK, seed=3) for _ in range(2))
+    environment, sound = (load(*TASK, seed=3, objects=["mug_000"]) for _ in range(2))
     task, fatal, states = environment.task, [True, True, False], []
     draw, write = task.draw, task.scene.write
 

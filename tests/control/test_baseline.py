@@ -169,7 +169,7 @@ def test_running_out_of_time_is_recorded(monkeypatch):
 def test_a_diverging_simulation_is_recorded_and_harms_no_later_episode(monkeypatch, episodes):
     def diverge(self, seed):
         yield HOLD
-        self._physics.data.qvel[:] = np.nan
+        self._environment.physics.data.qvel[:] = np.nan
         yield HOLD
 
     with monkeypatch.context() as patched:
@@ -194,8 +194,8 @@ def test_an_unknown_stage_cannot_be_raised():
         ({"objects": "chips_cam_000"}, "chips_can_000"),
         ({"objects": "./nowhere"}, "no such folder"),
         (
-            {"spec": EpisodeSpec(0, object="box_010")},
-            "unknown object 'box_010'; did you mean box_0",
+            {"spec": EpisodeSpec(0, object="box_099")},
+            "unknown object 'box_099'; did you mean box_0",
         ),
     ],
 )

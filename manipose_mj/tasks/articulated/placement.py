@@ -21,6 +21,8 @@ from manipose_mj.tasks.articulated.part_shape import PartShape, part_shape
 from manipose_mj.tasks.articulated.place_score import COMPLETE, LAYERS, PlaceScore
 from manipose_mj.tasks.core.start import Mount
 
+# A place that was found good is so nearby too [m, rad].
+_SHIFT, _TURN = 0.006, radians(1)
 _UP = np.array([0.0, 0.0, 1.0])
 _BATCH, _BATCHES = 64, 8  # candidates
 _KEPT = 24
@@ -92,7 +94,9 @@ def draw_place(
       standing: From which places are drawn.
     """
     places, _ = _good_places(_Key(asset, part), _layer(fraction), standing or Standing())
-    return places[rng.randint(len(places))]
+    place = places[rng.randint(len(places))]
+    shift, turn = rng.uniform(-_SHIFT, _SHIFT, 2), rng.uniform(-_TURN, _TURN)
+    return replace(place, position=place.position + [*shift, 0.0], yaw=place.yaw + turn)
 
 
 def widest_start(asset: Asset, part: MovingPart, standing: Standing | None = None) -> float:

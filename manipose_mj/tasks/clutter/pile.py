@@ -18,7 +18,7 @@ from manipose_mj.tasks.clutter.pile_layout import PileConfig, choose, drops
 from manipose_mj.tasks.clutter.pile_scene import PileScene
 from manipose_mj.tasks.core.start import NoStartError
 
-_ATTEMPTS = 12
+_ATTEMPTS = 40
 _DROP_GAP = 0.012  # between what falls next and what lies there already [m]
 _DROP_SPEED = 0.5  # downwards, to begin with [m/s]
 _FALL_TIME = 0.4  # until the next one falls [s]

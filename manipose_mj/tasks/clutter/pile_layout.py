@@ -69,11 +69,8 @@ def choose(
     if config.layout == "heap":
         return chosen
     sizes = np.array([np.sort(assets[i].label.extents) for i in chosen])
-    broad = sizes[:, 1] * sizes[:, 2]
-    round_ones = np.array([rolls(assets[i]) for i in chosen])
     if config.layout == "cover":
-        # What rolls neither stays hidden nor hides anything: it falls last.
-        liking, next_ones = broad + round_ones, round_ones - broad
+        liking, next_ones = sizes.prod(axis=1), -sizes[:, 2]
     else:
         liking, next_ones = -sizes[:, 1], -sizes.prod(axis=1)
     first = int(rng.choice(np.argsort(liking, kind="stable")[:_LIKED]))

@@ -184,6 +184,6 @@ def test_the_names_observed_are_the_same_in_every_episode(environments):
 def test_too_few_or_ungraspable_objects_are_refused():
     box = catalogue.load("box", 10)
     with pytest.raises(InputError, match="at least 5 objects; got 2"):
-        suite.load("clutter", "pick", objects=[box, box])
+        suite.load("clutter", "pick", objects=[box, catalogue.load("box", 16)])
     with pytest.raises(InputError, match="articulated"):
         suite.load("clutter", "pick", objects=[catalogue.load("cabinet", 0)] * 5)
