@@ -14,6 +14,7 @@ from dm_env.test_utils import EnvironmentTestMixin
 from manipose_mj import suite
 from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.environment import _STARTS
 from manipose_mj.tasks.observations.sensors import MODES, SensorConfig
 from tests.conformance.own_tasks import FATAL_STEP, diverging, registered
 from tests.few_objects import load
@@ -154,6 +155,6 @@ def test_a_start_that_diverges_is_followed_by_another(monkeypatch, caplog):
     sound.random_state.set_state(states[-1])
     expected = sound.reset()
     assert all(np.array_equal(v, step.observation[k]) for k, v in expected.observation.items())
-    fatal[:] = [True] * 5
+    fatal[:] = [True] * _STARTS
     with pytest.raises(PhysicsError):
         environment.reset()
