@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from benchmarks.clutter_table import OBJECTS, Outcome, run_scene, scene_objects, table
+from benchmarks.clutter_table import OBJECTS, Outcome, scene_objects, table
 from manipose_mj.assets import categories
 
 
@@ -36,14 +34,3 @@ def test_rows_count_starts_and_successes_and_name_failures():
         "- `clutter/pick`, scene 1, seed 100: no start: none of 16 piles",
         "- `clutter/stacked`, scene 1, seed 101: plan: no way",
     ]
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("task", "seed"),
-    [("stacked", 0), ("pick", 7)],
-    ids=["no way back from what was let go", "a cup's thin wall, which leans"],
-)
-def test_the_baseline_goes_on(task, seed):
-    (outcome,) = run_scene(task, seed=seed, scene=1, episodes=1)
-    assert outcome.success, outcome.reason

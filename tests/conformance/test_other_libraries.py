@@ -11,12 +11,15 @@ import pytest
 import manipose_mj
 from manipose_mj import suite
 from manipose_mj.gym import env_id
+from tests.few_objects import few, load
 
 
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_stable_baselines3_is_content(task):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    env = gymnasium.make(env_id(task[1]), control_mode="pd_ee_delta_pose").unwrapped
+    env = gymnasium.make(
+        env_id(task[1]), control_mode="pd_ee_delta_pose", objects=few("/".join(task))
+    ).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # its taste in spaces
         checker.check_env(env, warn=True, skip_render_check=True)
@@ -34,7 +37,7 @@ def test_stable_baselines3_learns_a_step():
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_shimmy_wraps_our_environments(task):
     wrapper = pytest.importorskip("shimmy").DmControlCompatibilityV0
-    env = wrapper(suite.load(*task, seed=0, environment_kwargs={"time_limit": 0.1}))
+    env = wrapper(load(*task, seed=0, environment_kwargs={"time_limit": 0.1}))
     observation, _ = env.reset(seed=0)
     assert observation.keys() == env.observation_space.keys()
     env.action_space.seed(0)

@@ -20,6 +20,7 @@ from manipose_mj.gym import ManiPoseEnv, env_id, register_envs
 from manipose_mj.tasks.goals import PoseGoal
 from manipose_mj.tasks.observations.sensors import MODES, SensorConfig
 from tests.conformance.own_tasks import FATAL_STEP, diverging, forget, registered
+from tests.few_objects import few
 
 ID = "manipose_mj/TargetPose-v0"
 # Joint torques and poses know no limits; targets of joints are radians, not shares of a range.
@@ -28,30 +29,31 @@ SENSIBLE = (
     "space maximum value is infinity",
     "we recommend using a symmetric and normalized space",
 )
+OBJECTS = few("single_object/target_pose")
 SENSORS = SensorConfig(cameras=("front",), height=24, width=32, cloud_size=256)
 
 
 @pytest.fixture(scope="module")
 def env() -> ManiPoseEnv:
-    return gymnasium.make(ID, reward_mode="dense").unwrapped
+    return gymnasium.make(ID, reward_mode="dense", objects=OBJECTS).unwrapped
 
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_the_environment_checker_is_content(task):
-    _check(gymnasium.make(env_id(task[1])).unwrapped)
+    _check(gymnasium.make(env_id(task[1]), objects=few("/".join(task))).unwrapped)
 
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
 def test_the_checker_is_content_with_control_modes(mode):
-    _check(gymnasium.make(ID, control_mode=mode, obs_mode="state").unwrapped)
+    _check(gymnasium.make(ID, control_mode=mode, obs_mode="state", objects=OBJECTS).unwrapped)
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", MODES)
 def test_the_checker_is_content_with_observation_modes(mode):
-    _check(gymnasium.make(ID, obs_mode=mode, sensors=SENSORS).unwrapped)
+    _check(gymnasium.make(ID, obs_mode=mode, sensors=SENSORS, objects=OBJECTS).unwrapped)
 
 
 def _check(checked: ManiPoseEnv) -> None:
@@ -90,7 +92,7 @@ def test_ids_are_made_of_the_tasks_names():
 
 
 def test_seeds_are_those_of_the_suite_and_replays_are_bit_identical(env):
-    theirs = suite.load("single_object", "target_pose", seed=17)
+    theirs = suite.load("single_object", "target_pose", seed=17, objects=OBJECTS)
     rng = np.random.default_rng(0)
     actions = [env.action_space.low * 0.5 + 0.1 * rng.random(8) for _ in range(15)]
     observations = [
@@ -184,7 +186,9 @@ def test_success_and_reward_are_functions_of_a_state(env):
 
 
 def test_spaces_follow_the_specifications():
-    seeing = gymnasium.make(ID, obs_mode="state+depth+segmentation+pointcloud", sensors=SENSORS)
+    seeing = gymnasium.make(
+        ID, obs_mode="state+depth+segmentation+pointcloud", sensors=SENSORS, objects=OBJECTS
+    )
     observation, _ = seeing.reset(seed=0)
     for name, spec in seeing.unwrapped.environment.observation_spec().items():
         space = seeing.observation_space[name]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.articulated.body_frame import (
@@ -163,7 +163,7 @@ def part_losses(
     votes: PointVotes,
     targets: dict[str, Float[Array, "n k"]],
     known: dict[str, Array],
-    mask: Float[Array, "n"],
+    mask: Bool[Array, "n"],
 ) -> dict[str, Float[Array, ""]]:
     """Cross entropy of classes and joint types; Laplace's likelihood of the votes of moving points."""
     moving = known["moving"] & mask

@@ -210,7 +210,7 @@ def test_furniture_of_partnet_mobility_serves(tmp_path):
     with partnet_mobility.opened(item) as scan:
         asset = build_articulated(scan, tmp_path / item.name)
     # Of the built-in objects those that fit, or one's own.
-    assert len(_load("store_bottom_drawer", objects=[asset]).task.pool.entities) == 2
+    assert len(_load("store_bottom_drawer", objects=[asset]).task.pool.entities) == 3
     environment = _load("store_bottom_drawer", objects=[asset, catalogue.load("box", 1)])
     task, _ = _reset(environment, 0)
     assert task.furniture.asset.name == "46236" and task.object_name == "box_001"

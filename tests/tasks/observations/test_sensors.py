@@ -124,7 +124,7 @@ def test_the_objects_points_lie_on_the_object(environment, seed):
     obj = _in_sight(task, environment.physics)
     own = task.instance_names.index(obj.mjcf_model.model)
     cloud = step.observation["pointcloud/points"][step.observation["pointcloud/instance"] == own]
-    assert len(cloud) > 20
+    assert len(cloud) >= 10  # a shelf may hide most of it
     _assert_on(obj, environment.physics, cloud)
     normals = step.observation["pointcloud/normals"][step.observation["pointcloud/instance"] == own]
     lengths = np.linalg.norm(normals, axis=1)
