@@ -15,7 +15,7 @@ from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
 from manipose_mj.tasks.articulated.placement import Standing, side
 from manipose_mj.tasks.core.config import EnvConfig, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
-from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject
+from manipose_mj.tasks.core.start import EpisodeStart, NoStartError, PlacedFurniture, PlacedObject
 
 
 class CavityTask(FurnitureTask):
@@ -61,6 +61,21 @@ class CavityTask(FurnitureTask):
     def cavity_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:
         """`T_world_cavity` of the part in question."""
         return self.pieces.cavity_pose(physics, self._piece)
+
+    def write(self, physics: mjcf.Physics, start: EpisodeStart) -> None:
+        """Put a simulation where an episode starts.
+
+        Raises:
+          NoStartError: An object does not come to rest: some roll on an oven's grid.
+        """
+        super().write(physics, start)
+        for name, entity in self.objects.items():
+            speed = float(entity.speeds(physics)[0])
+            if speed > self.config.tolerance.linear_speed:
+                raise NoStartError(
+                    f"{name}, {entity.asset.name}, still moves at {1000 * speed:.0f} mm/s after "
+                    f"{self.config.settle:g} s in {self.furniture.asset.name}"
+                )
 
     def sample_place(
         self,

@@ -23,7 +23,7 @@ _ANY_CABINET = ("cabinet",)
 # How many other objects may lie in a cavity when something is stored there, and when it is taken out.
 _STORED_BESIDE, _LEFT_INSIDE = 2, 1
 # Things rock on an oven's grid and on the rim of a turntable [s].
-_SETTLE_INSIDE = 1.2
+_SETTLE_INSIDE = 2.0
 # A door half open would be where the hand is at home.
 _PAST_HOME = (0.9, 1.0)
 _CANS_IN_DRAWERS = RequestedFurniture(
