@@ -38,13 +38,13 @@ def env() -> ManiPoseEnv:
     return gymnasium.make(ID, reward_mode="dense", objects=OBJECTS).unwrapped
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_the_environment_checker_is_content(task):
     _check(gymnasium.make(env_id(task[1]), objects=few("/".join(task))).unwrapped)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
 def test_the_checker_is_content_with_control_modes(mode):
     _check(gymnasium.make(ID, control_mode=mode, obs_mode="state", objects=OBJECTS).unwrapped)
@@ -67,6 +67,7 @@ def _check(checked: ManiPoseEnv) -> None:
     checked.close()
 
 
+@pytest.mark.full
 def test_the_checker_draws_and_closes_too():
     made = gymnasium.make(ID, render_mode="rgb_array", height=24, width=32)
     made.unwrapped.metadata = {
