@@ -11,7 +11,7 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj import suite
-from manipose_mj.control.baseline import Baseline
+from manipose_mj.control.baseline import MAX_PLANS, Baseline
 from manipose_mj.control.perception.pose_sources import check_pose_source
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
@@ -23,16 +23,24 @@ _RECORD_EVERY = 5  # control steps
 
 
 def run_episode(
-    config: EnvConfig, spec: EpisodeSpec, *, episode: int = 0, pose: str = "oracle"
+    config: EnvConfig,
+    spec: EpisodeSpec,
+    *,
+    episode: int = 0,
+    pose: str = "oracle",
+    planner_seed: int | None = None,
+    plans: int = MAX_PLANS,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
     Args:
       config: Of the environment, which is compiled once per process and configuration; objects by name or
         by folder.
-      spec: Of the episode; its seed is the motion planner's too.
+      spec: Of the episode.
       episode: Index, copied into the result.
       pose: Where object poses come from: `"oracle"` or `"estimated"`.
+      planner_seed: Of the motion planner; by default the episode's.
+      plans: How many the baseline may try.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
@@ -50,7 +58,7 @@ def run_episode(
     failure: StageFailure | None = None
     steps = 0
     try:
-        for action in baseline.actions(seed):
+        for action in baseline.actions(seed if planner_seed is None else planner_seed, plans):
             estimates.after_planning()
             last = environment.step(action).last()
             steps += 1
