@@ -207,6 +207,7 @@ class EstimatedPerception:
             body=body,
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
+            category=self._categories()[name],
         )
 
 
