@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from manipose_mj.control.planning.check import PlanState
 from manipose_mj.control.planning.plan_articulated import poses_in_area, poses_in_cavity
 from manipose_mj.control.planning.regrasp import Poses
 from manipose_mj.control.planning.table_places import poses_with_rotation
@@ -22,12 +23,12 @@ class Destination:
 
     Attributes:
       text: What the model is told about it.
-      poses: `T_world_label` for an object, when parts have these openings [m or rad]; empty where it does not fit.
+      poses: `T_world_label` for an object, when the plan has come so far; empty where it does not fit.
       only_for: Name of the one object it is for; None: any.
     """
 
     text: str
-    poses: Callable[[ObjectEstimate, Mapping[str, float]], Poses]
+    poses: Callable[[ObjectEstimate, PlanState], Poses]
     only_for: str | None = None
 
 
@@ -51,8 +52,8 @@ def named_destinations(
         if part.cavity is not None:
             found[f"inside {name}"] = Destination(
                 f"on the floor of what {name} closes",
-                lambda obj, openings, part=part: poses_in_cavity(
-                    obj, part, openings[part.name], estimate
+                lambda obj, state, part=part: poses_in_cavity(
+                    obj, part, state.openings[part.name], state.as_estimate()
                 ),
             )
     for goal in goals:

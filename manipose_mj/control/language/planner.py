@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from manipose_mj.control.language.description import RULES, goal_sentences, scene_text
-from manipose_mj.control.language.destinations import named_destinations
+from manipose_mj.control.language.destinations import Destination, named_destinations
 from manipose_mj.control.language.exchanges import (
     ChatModel,
     Exchange,
@@ -22,7 +23,7 @@ from manipose_mj.control.language.reply import (
     resolved_plans,
 )
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.planning.plan import CandidatePlan
+from manipose_mj.control.planning.plan import CandidatePlan, Step
 from manipose_mj.control.planning.set_aside import places_aside
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
@@ -74,24 +75,42 @@ class LanguagePlanner:
         destinations = named_destinations(goals, estimate, free)
         messages = self.question(goals, scene_text(estimate, destinations))
         schema = reply_schema(estimate, destinations)
+        steps = self.steps(messages, schema, estimate, destinations)
+        for plan in resolved_plans(steps, estimate, planner):
+            yield CandidatePlan(lambda plan=plan: plan)
+
+    def steps(
+        self,
+        messages: list[Message],
+        schema: dict[str, Any],
+        estimate: SceneEstimate,
+        destinations: Mapping[str, Destination],
+    ) -> tuple[Step | NamedMove, ...]:
+        """The steps of the model's answer, after as many repairs as it needs and may have.
+
+        Args:
+          messages: The question.
+          schema: Of the answer.
+          estimate: What is where.
+          destinations: Places by name.
+
+        Raises:
+          InputError: The model does not answer, declines, or its last repair is still wrong.
+        """
         mistake = ""
         for _ in range(1 + MAX_REPAIRS):
             reply = self._ask(messages, schema)
             try:
-                steps = read_reply(reply, estimate, destinations)
+                return read_reply(reply, estimate, destinations)
             except RefusedError as refusal:
                 raise InputError(f"the language model declines: {refusal}") from None
             except InputError as error:
                 mistake = str(error)
-                messages = [
-                    *messages,
-                    {"role": "assistant", "content": reply},
-                    {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
-                ]
-                continue
-            for plan in resolved_plans(steps, estimate, planner):
-                yield CandidatePlan(lambda plan=plan: plan)
-            return
+            messages = [
+                *messages,
+                {"role": "assistant", "content": reply},
+                {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
+            ]
         raise InputError(
             f"the language model's plan is still wrong after {MAX_REPAIRS} repairs: {mistake}"
         )
@@ -104,7 +123,7 @@ class LanguagePlanner:
             {"role": "user", "content": f"{scene}\n\nInstruction: {wanted}"},
         ]
 
-    def _ask(self, messages: list[Message], schema: dict) -> str:
+    def _ask(self, messages: list[Message], schema: dict[str, Any]) -> str:
         started, reply, error = time.perf_counter(), "", ""
         try:
             reply = self._model.answer(messages, schema)

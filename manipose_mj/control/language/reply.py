@@ -118,7 +118,7 @@ def _step(
         raise InputError(f"{where}: {name!r} is for {place.only_for}, not for {subject}")
     if state.held != subject:
         raise InputError(f"{where}: move_to {subject}: the hand does not hold it; grasp it before")
-    poses = place.poses(estimate.objects[subject], state.openings)
+    poses = place.poses(state.as_estimate().objects[subject], state)
     if not poses:
         raise InputError(f"{where}: {subject} does not fit {name!r} in any orientation")
     step = Step("move_to", subject, poses=poses)

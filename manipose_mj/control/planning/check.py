@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -29,6 +31,7 @@ class PlanState:
 
     def __init__(self, estimate: SceneEstimate) -> None:
         """Before the first step, with an empty hand."""
+        self._estimate = estimate
         self.parts = estimate.parts
         self.openings = {name: part.opening for name, part in estimate.parts.items()}
         self.places = {name: (obj.label_pose,) for name, obj in estimate.objects.items()}
@@ -38,6 +41,22 @@ class PlanState:
         """Whether the hand gets into a drawer or through a door."""
         low, high = self.parts[name].joint.range
         return self.openings[name] >= low + OPEN_ENOUGH * (high - low)
+
+    def as_estimate(self) -> SceneEstimate:
+        """The scene as it is then; what may be at several places is at the first."""
+        objects = {
+            name: replace(obj, pose=self.places[name][0] @ invert(obj.label.pose))
+            for name, obj in self._estimate.objects.items()
+        }
+        parts = {
+            name: replace(
+                part,
+                opening=self.openings[name],
+                pose=part.base_pose @ joint_motion(part, self.openings[name]),
+            )
+            for name, part in self.parts.items()
+        }
+        return replace(self._estimate, objects=objects, parts=parts)
 
     def part_around(self, label_pose: Float[np.ndarray, "4 4"]) -> str | None:
         """The drawer or door in whose cavity an object at `T_world_label` is, or None."""
@@ -93,7 +112,19 @@ class PlanState:
             raise InputError(
                 f"{where}: move_to {step.subject}: only a hand on its handle can open it; grasp it before"
             )
+        self._carry_along(self.parts[step.subject], step.opening)
         self.openings[step.subject] = step.opening
+
+    def _carry_along(self, part: PartEstimate, opening: float) -> None:
+        """Move what lies in a drawer with it."""
+        if part.cavity is None or not part.cavity.moves_with_part:
+            return
+        now = self.openings[part.name]
+        turned = joint_motion(part, opening) @ invert(joint_motion(part, now))
+        motion = part.base_pose @ turned @ invert(part.base_pose)
+        for name, poses in self.places.items():
+            if name != self.held and in_cavity(part, now, poses[0]):
+                self.places[name] = tuple(motion @ pose for pose in poses)
 
     def _move_object(self, step: Step, where: str) -> None:
         if not step.poses:

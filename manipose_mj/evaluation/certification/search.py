@@ -14,15 +14,12 @@ from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
-ATTEMPTS = 3
+ATTEMPTS = 2
 
 
 def attempts(seed: int) -> tuple[Certificate, ...]:
-    """What is tried in turn for an episode's seed: first what an evaluation does, then other samples and more plans."""
-    return tuple(
-        Certificate((seed + i) % 2**32, MAX_PLANS if i == 0 else 2 * MAX_PLANS)
-        for i in range(ATTEMPTS)
-    )
+    """What is tried in turn for an episode's seed: first what an evaluation does, then other samples."""
+    return tuple(Certificate((seed + i) % 2**32, MAX_PLANS) for i in range(ATTEMPTS))
 
 
 def chosen_starts(
