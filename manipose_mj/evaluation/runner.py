@@ -338,6 +338,8 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
+    if config.policy is not None:
+        settings["pose"] = "oracle" if config.policy.sees_true_poses else "none"
     settings["poses"] = config.poses
     return {
         "tasks": summarize(results),
