@@ -33,3 +33,7 @@ class WorkerDiedError(RuntimeError):
 
     Nobody's input is wrong: the command line prints the message and exits with code 1.
     """
+
+
+class PolicyLostError(WorkerDiedError):
+    """The server of a policy went away in the middle of an evaluation; it can be resumed."""

@@ -25,6 +25,7 @@ from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, S
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.instructions.sentence import instruction
 
 # Plans an episode may try, and stages whose failure another plan may mend.
 MAX_PLANS = 5
@@ -121,6 +122,7 @@ class Baseline:
         self.status = ""
         scene, task = self._scene(), self._environment.task
         scene.perception.reset(seed)
+        self._planner.begin(instruction(task))
         timestep = task.control_timestep
         executor = Executor(scene.perception, timestep)
         primitives = Primitives(executor)

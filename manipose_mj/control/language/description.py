@@ -7,17 +7,6 @@ from collections.abc import Mapping
 from manipose_mj.control.language.destinations import Destination
 from manipose_mj.control.planning.check import PlanState
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
-from manipose_mj.tasks.goals import (
-    Goal,
-    InsideGoal,
-    OnTableGoal,
-    OpenGoal,
-    OrientationGoal,
-    PoseGoal,
-    ShutGoal,
-    TakenOutGoal,
-    UprightGoal,
-)
 
 RULES = """\
 You plan for one robot arm with a parallel gripper. Answer with JSON only: {"plan": [...], "refusal": ""}.
@@ -50,27 +39,6 @@ def scene_text(estimate: SceneEstimate, destinations: Mapping[str, Destination])
         for name, place in destinations.items()
     ]
     return "\n".join(lines)
-
-
-def goal_sentences(goals: tuple[Goal, ...]) -> str:
-    """What a task wants, in words of the scene's names."""
-    return " ".join(sentence for goal in goals if (sentence := _sentence(goal)))
-
-
-def _sentence(goal: Goal) -> str:
-    if isinstance(goal, PoseGoal | OrientationGoal | UprightGoal):
-        return f"Bring {goal.object} to its goal."
-    if isinstance(goal, InsideGoal):
-        return f"Put {goal.object} inside {goal.part}."
-    if isinstance(goal, TakenOutGoal):
-        return f"Take {goal.object} out of {goal.part} and put it on its area."
-    if isinstance(goal, OnTableGoal):
-        return f"Keep {goal.object} on the table."
-    if isinstance(goal, OpenGoal):
-        return f"Open {goal.part}."
-    if isinstance(goal, ShutGoal):
-        return f"Shut {goal.part}."
-    return ""
 
 
 def _object_line(obj: ObjectEstimate, state: PlanState) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from manipose_mj.control.language.description import RULES, goal_sentences, scene_text
+from manipose_mj.control.language.description import RULES, scene_text
 from manipose_mj.control.language.destinations import Destination, named_destinations
 from manipose_mj.control.language.exchanges import (
     ChatModel,
@@ -46,10 +46,15 @@ class LanguagePlanner:
 
         Args:
           model: What is asked.
-          instruction: What to do instead of the task's goals.
+          instruction: What to do instead of what the episode asks for.
           record: File that every exchange is added to.
         """
         self._model, self._instruction, self._record = model, instruction, record
+        self._asked_for = instruction or ""
+
+    def begin(self, instruction: str) -> None:
+        """An episode begins, which asks for this in words."""
+        self._asked_for = self._instruction or instruction
 
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         """A model plans to the end."""
@@ -73,7 +78,7 @@ class LanguagePlanner:
             return places_aside(obj, (), estimate, planner)
 
         destinations = named_destinations(goals, estimate, free)
-        messages = self.question(goals, scene_text(estimate, destinations))
+        messages = self.question(scene_text(estimate, destinations))
         schema = reply_schema(estimate, destinations)
         steps = self.steps(messages, schema, estimate, destinations)
         for plan in resolved_plans(steps, estimate, planner):
@@ -115,12 +120,11 @@ class LanguagePlanner:
             f"the language model's plan is still wrong after {MAX_REPAIRS} repairs: {mistake}"
         )
 
-    def question(self, goals: tuple[Goal, ...], scene: str) -> list[Message]:
+    def question(self, scene: str) -> list[Message]:
         """The conversation that opens an exchange."""
-        wanted = self._instruction or goal_sentences(goals)
         return [
             {"role": "system", "content": RULES},
-            {"role": "user", "content": f"{scene}\n\nInstruction: {wanted}"},
+            {"role": "user", "content": f"{scene}\n\nInstruction: {self._asked_for}"},
         ]
 
     def _ask(self, messages: list[Message], schema: dict[str, Any]) -> str:

@@ -17,6 +17,10 @@ from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
 class TaskPlanner(Protocol):
     """From goals and an estimate of the scene to plans, whoever makes them."""
 
+    def begin(self, instruction: str) -> None:
+        """An episode begins, which asks for this in words."""
+        ...
+
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         """Whether each plan is one move only, after which the scene is looked at again."""
         ...
@@ -39,6 +43,9 @@ class TaskPlanner(Protocol):
 
 class RulePlanner:
     """Plans by the rules of this module."""
+
+    def begin(self, instruction: str) -> None:
+        """Goals say all that rules need."""
 
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         """In clutter."""

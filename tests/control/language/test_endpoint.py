@@ -115,7 +115,7 @@ def asked(server: Server, tmp_path, *, timeout: float = 20.0, retries: int = 1):
     model = EndpointModel("m", server.url, timeout=timeout, retries=retries)
     planner = LanguagePlanner(model, "Open the top drawer.", path)
     destinations = named_destinations((), estimate)
-    messages = planner.question((), scene_text(estimate, destinations))
+    messages = planner.question(scene_text(estimate, destinations))
     schema = reply_schema(estimate, destinations)
     return lambda: planner.steps(messages, schema, estimate, destinations), path
 

@@ -29,7 +29,7 @@ def asked(case, path: Path):
     destinations = named_destinations((), estimate)
     live = LanguagePlanner(planner, case["instruction"], path)
     schema = reply_schema(estimate, destinations)
-    messages = live.question((), scene_text(estimate, destinations))
+    messages = live.question(scene_text(estimate, destinations))
     steps = live.steps(messages, schema, estimate, destinations)
     again = LanguagePlanner(ReplayModel(path), case["instruction"]).steps(
         messages, schema, estimate, destinations
