@@ -44,6 +44,20 @@ class PoseLabel:
         """`T_mesh_label`."""
         return compose(self.rotation, self.origin)
 
+    def reach(self, rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+        """Half the lengths that the object takes up along the axes of a frame [m].
+
+        Those of its bounding box; of its cylinder, where its X is an axis of revolution.
+
+        Args:
+          rotation: `R_frame_label`.
+        """
+        half = self.extents / 2
+        if not self.symmetry.axial:
+            return np.abs(rotation) @ half
+        along = np.abs(rotation[:, 0])
+        return along * half[0] + np.sqrt(np.clip(1 - along**2, 0, 1)) * half[1:].max()
+
 
 def symmetry_to_bop(label: PoseLabel, group: SymmetryGroup) -> dict[str, Any]:
     """`symmetries_discrete` and `symmetries_continuous` in the mesh frame, as in BOP's models_info.
