@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -59,8 +59,8 @@ def run_episode(
       InputError: Something named does not exist or cannot be used.
     """
     environment, policy = environment_of(config), _baseline(config, pose, plans, planner)
-    naming = _Naming(config.task, episode, pose)
-    return _played(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
+    naming = Naming(config.task, episode, pose)
+    return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
 
 def run_policy_episode(
@@ -91,27 +91,41 @@ def run_policy_episode(
     if settings.sees_true_poses:
         source = "oracle"
     rules = Rules(settings.hz, settings.execute, settings.stop)
-    naming = _Naming(config.task, episode, source)
-    return _played(environment_of(config), policy, spec, rules, naming, settings)
+    naming = Naming(config.task, episode, source)
+    return play(environment_of(config), policy, spec, rules, naming, settings)
 
 
-class _Naming:
-    """What an episode's result copies: task, index, where poses came from."""
+@dataclass(frozen=True)
+class Naming:
+    """What an episode's result copies. Attributes: task; episode: its index; pose_source: where poses came from."""
 
-    def __init__(self, task: str, episode: int, pose_source: str) -> None:
-        self.task, self.episode, self.pose_source = task, episode, pose_source
+    task: str
+    episode: int
+    pose_source: str
 
 
-def _played(
+def play(
     environment: TaskEnvironment,
     policy: Policy,
     spec: EpisodeSpec,
     rules: Rules,
-    naming: _Naming,
+    naming: Naming,
     settings: PolicySettings | None = None,
-    *,
+    after_step: Callable[[int], None] = lambda steps: None,
     policy_seed: int | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
+    """Reset an environment and let a policy act in it.
+
+    Args:
+      environment: Of the task.
+      policy: To play.
+      spec: Of the episode.
+      rules: Rates and when to stop.
+      naming: For the result.
+      settings: What the policy sees; None: nothing, as for the baseline.
+      after_step: Called with the number of control steps, first with 0 after the reset.
+      policy_seed: That the policy gets; by default the episode's.
+    """
     started = time.perf_counter()
     seed = spec.seed or 0
     first = environment.reset(replace(spec, seed=seed))
@@ -125,6 +139,12 @@ def _played(
         estimates = EstimateErrors(task, environment.physics, inner.baseline)
     recorder = _Recorder(environment, inner)
     recorder.record()
+    after_step(0)
+
+    def both(steps: int) -> None:
+        recorder.after_step(steps)
+        after_step(steps)
+
     limits = environment.action_spec()
     features = None if settings is None else Features(environment)
     space = ActionSpace(limits.minimum, limits.maximum, task.control_mode.name, rules.hz)
@@ -147,7 +167,7 @@ def _played(
             observe=_observer(features, droid),
             translate=from_droid if droid else np.asarray,
             after_decision=estimates.after_planning if estimates else lambda: None,
-            after_step=recorder.after_step,
+            after_step=both,
         )
         outcome = rollout.run(first)
     recorder.record()
@@ -167,7 +187,7 @@ def _observer(features: Features | None, droid: bool) -> Callable[[Any], dict[st
 def _result(
     environment: TaskEnvironment,
     outcome: Outcome,
-    naming: _Naming,
+    naming: Naming,
     seed: int,
     estimates: EstimateErrors | None,
     wall_s: float,

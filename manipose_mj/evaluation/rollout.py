@@ -9,13 +9,13 @@ from typing import Any
 
 import dm_env
 import numpy as np
-from dm_control import composer
 from jaxtyping import Float
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.policy_settings import CONTROL_HZ, Stop
 from manipose_mj.failures import StageFailure
 from manipose_mj.policies.protocol import Decision, Policy, answered_width, checked_answer
+from manipose_mj.tasks.core.environment import TaskEnvironment
 
 SUCCESS_HELD = 0.5  # for how long a goal must hold until `stop="success"` ends an episode [s]
 _ROUNDING = 1e-6  # beyond a limit that counts as at it: policies compute in float32
@@ -56,7 +56,7 @@ class Rollout:
 
     def __init__(
         self,
-        environment: composer.Environment,
+        environment: TaskEnvironment,
         policy: Policy,
         rules: Rules,
         *,
@@ -97,10 +97,12 @@ class Rollout:
         try:
             while True:
                 decision = self._decide(step)
-                for action in self._translate(decision.actions)[: self._rules.execute]:
-                    step = self._carry_out(action)
-                    if step is None:
+                actions = self._translate(decision.actions)[: self._rules.execute]
+                for number, action in enumerate(actions, start=1):
+                    following = self._carry_out(action, observe=number == len(actions))
+                    if following is None:
                         return self.outcome
+                    step = following
                 if decision.done:
                     return self.outcome
         except StageFailure as failure:
@@ -126,14 +128,22 @@ class Rollout:
         finally:
             self._after_decision()
 
-    def _carry_out(self, action: Float[np.ndarray, "n"]) -> dm_env.TimeStep | None:
-        """The time step after an action was held for its time; None where the episode has ended."""
+    def _carry_out(
+        self, action: Float[np.ndarray, "n"], *, observe: bool
+    ) -> dm_env.TimeStep | None:
+        """The time step after an action was held for its time; None where the episode has ended.
+
+        Args:
+          action: Not clipped yet.
+          observe: Whether the policy decides next.
+        """
         bounded = np.clip(action, self._low, self._high)
         self.outcome.clipped += bool(np.abs(bounded - action).max() > _ROUNDING)
         target: Any = bounded
         step = None
-        for _ in range(self._next_hold()):
-            step = self._environment.step(target)
+        hold = self._next_hold()
+        for held in range(1, hold + 1):
+            step = self._environment.step(target, observe=observe and held == hold)
             target = None  # the servos go on to where the action sent them
             self.outcome.steps += 1
             self._after_step(self.outcome.steps)

@@ -1,0 +1,1 @@
+"""`manipose demos`: record demonstrations, replay and export them."""
