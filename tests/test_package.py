@@ -27,7 +27,7 @@ ORDER = (
     ("manipose_mj.mjcf",),
     ("manipose_mj.grasp_sampling",),
     ("manipose_mj.assets",),
-    ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console"),
+    ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
     ("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
 )
 # What scans and generators are made into is the package's; robots and tasks are none of the pipeline's business.
