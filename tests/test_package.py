@@ -19,7 +19,7 @@ PACKAGES = ("manipose_mj", "asset_pipeline")
 # Each line may import the lines below it, and itself; imports inside functions and for types count too.
 ORDER = (
     ("manipose_mj.cli",),
-    ("manipose_mj.gym", "manipose_mj.evaluation"),
+    ("manipose_mj.gym", "manipose_mj.evaluation", "manipose_mj.bop"),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
     ("manipose_mj.tasks", "manipose_mj.ppf_jax"),
