@@ -35,7 +35,7 @@ class WorkerDiedError(RuntimeError):
     """
 
 
-class ServerLostError(RuntimeError):
+class ServerLostError(WorkerDiedError):
     """The server of somebody's method went away, or failed, in the middle of work.
 
     Nothing that was asked of it counts as its failure: the command line prints the message and exits with code 1.

@@ -22,6 +22,7 @@ ORDER = (
     ("manipose_mj.gym", "manipose_mj.evaluation", "manipose_mj.bop"),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
+    ("manipose_mj.estimators",),
     ("manipose_mj.tasks", "manipose_mj.ppf_jax"),
     ("manipose_mj.actions",),
     ("manipose_mj.mjcf",),

@@ -14,7 +14,6 @@ from typing import Any
 
 import joblib
 import numpy as np
-import trimesh
 from jaxtyping import Bool, Float
 from PIL import Image
 from scipy.spatial.distance import pdist
@@ -24,8 +23,7 @@ from manipose_mj.assets.label import PoseLabel, symmetry_to_bop
 from manipose_mj.bop.dataset import OURS_FILE, TARGETS_FILE
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
-from manipose_mj.poses import invert, transform
-from manipose_mj.ppf_jax.data.pictures import Picture, shape_colours
+from manipose_mj.ppf_jax.data.pictures import Picture, label_mesh
 from manipose_mj.ppf_jax.data.rendering import Subject
 from manipose_mj.ppf_jax.data.view_settings import ViewSetting, task_intrinsics
 from manipose_mj.ppf_jax.data.view_stream import (
@@ -154,22 +152,6 @@ def _write_model(root: Path, number: int, subject: Subject) -> dict[str, Any]:
     }
     ours = {"name": subject.name, "category": subject.category, "type": label.object_type}
     return {"number": number, "info": info, "ours": ours}
-
-
-def label_mesh(subject: Subject) -> trimesh.Trimesh:
-    """The surface of a subject in the frame of its label [m], its colours at the vertices."""
-    meshes = [shape.surface() for shape in subject.shapes]
-    rgb = np.round(255 * shape_colours(subject.shapes)).astype(np.uint8)
-    sizes = [len(mesh.vertices) for mesh in meshes]
-    starts = np.cumsum([0, *sizes[:-1]])
-    vertices = np.concatenate([np.asarray(mesh.vertices, float) for mesh in meshes])
-    faces = np.concatenate([mesh.faces + first for mesh, first in zip(meshes, starts, strict=True)])
-    return trimesh.Trimesh(
-        transform(invert(subject.label.pose), vertices),
-        faces,
-        vertex_colors=np.repeat(rgb, sizes, axis=0),
-        process=False,
-    )
 
 
 def _write_lists(

@@ -26,6 +26,11 @@ def evaluate(
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
     dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None,
+    estimator: Annotated[
+        str | None, arg(metavar="MODULE:FACTORY|ws://HOST:PORT", help_behavior_hint="")
+    ] = None,
+    estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
+    give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
 ) -> int:
     """Run the baseline, and write results.jsonl, summary.json and report.html.
 
@@ -42,9 +47,15 @@ def evaluate(
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
       dask: Run on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786, instead of --jobs; its
         workers have to see --out and the folders of --objects.
+      estimator: Whose estimates --pose estimated means: those of what a factory of a Python module makes, or of a
+        server; by default those of the package's weights.
+      estimator_args: Keyword arguments of its factory, as a JSON object.
+      give_cad: Give it the mesh of the very object that is seen; the results say so.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
+    from manipose_mj.estimators.loading import load_estimator
+    from manipose_mj.estimators.settings import chosen_estimator
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.protocol.frozen import EPISODES
 
@@ -55,9 +66,20 @@ def evaluate(
     if episodes is None:
         episodes = EPISODES if protocol else 50
     config = EvaluationConfig(
-        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol, dask=dask
+        tasks,
+        out,
+        episodes,
+        seed,
+        pose,
+        jobs,
+        objects or None,
+        protocol=protocol,
+        dask=dask,
+        estimator=chosen_estimator(estimator, estimator_args, give_cad),
     )
     named = check_names(tasks, objects)
+    if config.estimator is not None:
+        load_estimator(config.estimator)  # before minutes are spent on building objects
     if protocol is not None:
         named = names_in_protocol(protocol, tasks, episodes)
     with cluster(dask):

@@ -14,7 +14,7 @@ from manipose_mj.cli import demo, doctor, evaluate, render, tasks, view
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.console.process import hush_glfw
-from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
+from manipose_mj.errors import InputError, WorkerDiedError
 
 DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
 EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 1, 2, 130, 141
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     except InputError as error:
         return _fail(str(error), EXIT_INPUT)
-    except (WorkerDiedError, ServerLostError) as error:
+    except WorkerDiedError as error:
         return _fail(str(error), EXIT_FAILED)
     except KeyboardInterrupt:
         return _fail("interrupted; whole results are kept", EXIT_INTERRUPTED)

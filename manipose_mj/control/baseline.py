@@ -22,6 +22,7 @@ from manipose_mj.control.planning.planner import candidate_plans
 from manipose_mj.control.planning.rearrangement import in_clutter, is_supported
 from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
 
@@ -63,17 +64,23 @@ class _Scene:
 class Baseline:
     """Plans and acts in one environment; build it once, run it for many episodes."""
 
-    def __init__(self, environment: composer.Environment, pose: str = "oracle") -> None:
+    def __init__(
+        self,
+        environment: composer.Environment,
+        pose: str = "oracle",
+        estimator: EstimatorSettings | None = None,
+    ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
         Args:
           environment: Of one of this package's tasks, after its first reset.
           pose: Where object poses come from, one of `POSE_SOURCES`.
+          estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
 
         Raises:
-          InputError: There is no such source.
+          InputError: There is no such source or estimator.
         """
-        self._environment, self._pose = environment, pose
+        self._environment, self._pose, self._estimator = environment, pose, estimator
         self._compiled = self._compile()
         self.status = ""
 
@@ -97,7 +104,7 @@ class Baseline:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
         arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        perception = make_perception(self._pose, task, physics)
+        perception = make_perception(self._pose, task, physics, self._estimator)
         return _Scene(physics.model.ptr, arm, perception)
 
     def actions(self, seed: int) -> Iterator[Action]:

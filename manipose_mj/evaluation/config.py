@@ -12,6 +12,7 @@ import numpy as np
 
 from manipose_mj.assets.categories import Split
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class EvaluationConfig:
         training objects.
       dask: Address of a dask scheduler whose workers run the episodes instead of `jobs` processes of this
         machine; they have to see `out` and the folders of `objects`. Results do not depend on it.
+      estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
     """
 
     tasks: tuple[str, ...]
@@ -46,6 +48,7 @@ class EvaluationConfig:
     objects: tuple[str, ...] | None = None
     protocol: str | None = None
     dask: str | None = None
+    estimator: EstimatorSettings | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -55,6 +58,8 @@ class EvaluationConfig:
         for name, least in (("episodes", 1), ("seed", 0), ("jobs", 1)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; expected at least {least}")
+        if self.estimator is not None and self.pose != "estimated":
+            raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
 
@@ -117,6 +122,7 @@ class EvaluationConfig:
             "objects": None if self.objects is None else list(self.objects),
             "protocol": self.protocol,
             "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,
+            "estimator": self.estimator and self.estimator.identity,
         }
 
     @property
@@ -125,6 +131,7 @@ class EvaluationConfig:
         words = ["manipose", "evaluate", *self.tasks]
         chosen = ["--protocol", self.protocol] if self.protocol else ["--seed", str(self.seed)]
         words += ["--episodes", str(self.episodes), *chosen, "--pose", self.pose]
+        words += self.estimator.words if self.estimator is not None else []
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:
             words += ["--objects", *self.objects]

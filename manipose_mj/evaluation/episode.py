@@ -13,6 +13,7 @@ from dm_control import composer
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.perception.pose_sources import check_pose_source
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
 from manipose_mj.failures import StageFailure
@@ -23,7 +24,12 @@ _RECORD_EVERY = 5  # control steps
 
 
 def run_episode(
-    config: EnvConfig, spec: EpisodeSpec, *, episode: int = 0, pose: str = "oracle"
+    config: EnvConfig,
+    spec: EpisodeSpec,
+    *,
+    episode: int = 0,
+    pose: str = "oracle",
+    estimator: EstimatorSettings | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -33,14 +39,16 @@ def run_episode(
       spec: Of the episode; its seed is the motion planner's too.
       episode: Index, copied into the result.
       pose: Where object poses come from: `"oracle"` or `"estimated"`.
+      estimator: Whose estimates they are; None: those of the package's weights.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
+      ServerLostError: The estimator's server went away.
     """
     check_pose_source(pose)
     started = time.perf_counter()
     seed = spec.seed or 0
-    environment, baseline = _environment(config, pose)
+    environment, baseline = _environment(config, pose, estimator)
     environment.reset(replace(spec, seed=seed))
     task = environment.task
     estimates = EstimateErrors(task, environment.physics, baseline)
@@ -127,8 +135,10 @@ class _Recorder:
 
 
 @lru_cache(maxsize=4)
-def _environment(config: EnvConfig, pose: str) -> tuple[TaskEnvironment, Baseline]:
+def _environment(
+    config: EnvConfig, pose: str, estimator: EstimatorSettings | None = None
+) -> tuple[TaskEnvironment, Baseline]:
     """Made once per process and configuration."""
     environment = suite.make(config, 0)
     environment.reset()
-    return environment, Baseline(environment, pose)
+    return environment, Baseline(environment, pose, estimator)

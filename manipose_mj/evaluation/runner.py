@@ -10,12 +10,15 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
-from manipose_mj.errors import InputError, WorkerDiedError
+from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
+from manipose_mj.estimators.loading import load_estimator
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import (
     EpisodeResult,
@@ -51,7 +54,12 @@ class Runner(Protocol):
 
 
 def simulate(
-    config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
+    config: EnvConfig,
+    spec: EpisodeSpec,
+    *,
+    episode: int,
+    pose: str,
+    estimator: EstimatorSettings | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """The runner of every real evaluation: the baseline policy in MuJoCo."""
     from manipose_mj.evaluation.episode import run_episode  # loads the simulator: workers only
@@ -61,7 +69,7 @@ def simulate(
     level = simulator_log.level
     simulator_log.setLevel(logging.ERROR)
     try:
-        return run_episode(config, spec, episode=episode, pose=pose)
+        return run_episode(config, spec, episode=episode, pose=pose, estimator=estimator)
     finally:
         simulator_log.setLevel(level)
 
@@ -93,8 +101,13 @@ def evaluate(
     Raises:
       InputError: The folder cannot be written or holds results of something else, an episode's
         input is wrong, or there is no such cluster.
-      WorkerDiedError: A worker process was killed; what had ended is kept.
+      WorkerDiedError: A worker process was killed, or an estimator's server; what had ended is kept.
     """
+    if config.estimator is not None and runner is simulate:
+        load_estimator(config.estimator)  # what is not there is told before anything is written
+        if config.jobs > 1 or config.dask is not None:
+            load_estimator.cache_clear()  # workers make their own
+        runner = partial(simulate, estimator=config.estimator)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), _results_file(config.out) as file:
@@ -247,7 +260,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
-    except (InputError, OSError, MemoryError):
+    except (InputError, OSError, MemoryError, ServerLostError):
         raise
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)

@@ -16,6 +16,10 @@ SCHEMES = ("ws://", "wss://")
 OPEN_S, ANSWER_S = 10.0, 600.0
 
 
+class RemoteFailureError(RuntimeError):
+    """The method failed on a question and said so; its server may have hung up."""
+
+
 def is_address(reference: str) -> bool:
     """Whether a reference names a server rather than a Python object."""
     return reference.startswith(SCHEMES)
@@ -43,13 +47,16 @@ class Client:
         self.address, self._answer_s = address, answer_s
         self._stack = ExitStack()
         try:
-            opening = connect(address, compression=None, max_size=None, open_timeout=open_s)
+            # No pings: a method may be busy for longer than they wait.
+            opening = connect(
+                address, compression=None, max_size=None, open_timeout=open_s, ping_interval=None
+            )
             self._socket: ClientConnection = self._stack.enter_context(opening)
         except (OSError, InvalidURI, InvalidHandshake) as error:
             raise InputError(f"{address}: no server answers ({_line(error)})") from None
         try:
             self.metadata = self._received(open_s)
-        except ServerLostError as error:
+        except (ServerLostError, RemoteFailureError) as error:
             self.close()
             raise InputError(str(error)) from None
 
@@ -57,7 +64,8 @@ class Client:
         """The server's answer.
 
         Raises:
-          ServerLostError: The connection broke, or the server reported an error of its own.
+          ServerLostError: The connection broke, or what came is no answer.
+          RemoteFailureError: The server reports an error of its own, by text.
         """
         try:
             self._socket.send(pack(question))
@@ -78,7 +86,7 @@ class Client:
             raise ServerLostError(f"{self.address}: connection lost ({_line(error)})") from None
         if isinstance(content, str):  # how openpi's servers report an exception
             last = (content.strip().splitlines() or ["nothing"])[-1]
-            raise ServerLostError(f"{self.address}: the server failed: {last[:300]}")
+            raise RemoteFailureError(f"{self.address}: the server failed: {last[:300]}")
         try:
             message = unpack(content)
         except ValueError as error:

@@ -29,13 +29,13 @@ def pack(message: Any) -> bytes:
 
 
 def unpack(content: bytes) -> Any:
-    """The message that `pack` or `openpi_client.msgpack_numpy` made bytes of; its arrays are read-only.
+    """The message that `pack` or `openpi_client.msgpack_numpy` made bytes of; its arrays can be written to.
 
     Raises:
       ValueError: The bytes are no such message.
     """
     try:
-        return msgpack.unpackb(content, object_hook=_decoded)
+        return msgpack.unpackb(content, object_hook=_decoded, strict_map_key=False)
     except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
         raise ValueError(f"not a msgpack message ({type(error).__name__}: {error})") from None
 
@@ -54,7 +54,7 @@ def _encoded(value: Any) -> Any:
 def _decoded(value: dict[Any, Any]) -> Any:
     if _ARRAY in value:
         flat = np.frombuffer(value[b"data"], np.dtype(value[b"dtype"]))
-        return flat.reshape(value[b"shape"])
+        return flat.reshape(value[b"shape"]).copy()
     if _NUMBER in value:
         return np.dtype(value[b"dtype"]).type(value[b"data"])
     return value

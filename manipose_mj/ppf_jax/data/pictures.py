@@ -11,11 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
 from manipose_mj.assets.geometry import Shape
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
+from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.data.rasteriser import NOTHING, Raster, Triangles, pixel_rays, rasterise
 from manipose_mj.ppf_jax.data.rendering import Subject, View, grounded, measured
 from manipose_mj.ppf_jax.data.view_settings import ViewSetting
@@ -80,6 +82,22 @@ def picture(view: View, subject: Subject, setting: ViewSetting, name: str) -> Pi
         visible=whole(view.exact.item == _OBJECT),
         silhouette=alone.item == _OBJECT,
         intrinsics=image,
+    )
+
+
+def label_mesh(subject: Subject) -> trimesh.Trimesh:
+    """The surface of a subject in the frame of its label [m], its colours at the vertices."""
+    meshes = [shape.surface() for shape in subject.shapes]
+    rgb = np.round(255 * shape_colours(subject.shapes)).astype(np.uint8)
+    sizes = [len(mesh.vertices) for mesh in meshes]
+    starts = np.cumsum([0, *sizes[:-1]])
+    vertices = np.concatenate([np.asarray(mesh.vertices, float) for mesh in meshes])
+    faces = np.concatenate([mesh.faces + first for mesh, first in zip(meshes, starts, strict=True)])
+    return trimesh.Trimesh(
+        transform(invert(subject.label.pose), vertices),
+        faces,
+        vertex_colors=np.repeat(rgb, sizes, axis=0),
+        process=False,
     )
 
 
