@@ -17,11 +17,11 @@ from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, pose_error
-from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.outlier_removal import not_alone
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.model import (
     Estimates,
     EstimatingModel,

@@ -105,7 +105,10 @@ def test_a_bad_estimator_is_one_line_and_exit_2(name, arguments, message, tmp_pa
     [
         (["evaluate", "single_object/target_pose", "--estimator", "a:b"], "needs --pose estimated"),
         (["evaluate", "single_object/target_pose", "--give-cad"], "--give-cad is for an estimator"),
-        (["pose", "evaluate", "mug", "--estimator-args", "{}"], "--estimator-args is for an estimator"),
+        (
+            ["pose", "evaluate", "mug", "--estimator-args", "{}"],
+            "--estimator-args is for an estimator",
+        ),
         (["pose", "evaluate", "mug", "--estimator", "a:b", "--weights", "w.npz"], "leave them out"),
     ],
 )
@@ -200,7 +203,9 @@ def test_poses_of_views_are_in_their_order_and_timed(views):
         EstimatorService("a", answers.Middle()), views, give_cad=False, progress=told.append
     )
     assert told == [cloud.name for cloud in clouds] == [seen.cloud.name for seen in views]
-    np.testing.assert_allclose(found.poses[1, :3, 3], np.median(clouds[1].points, axis=0), atol=1e-6)
+    np.testing.assert_allclose(
+        found.poses[1, :3, 3], np.median(clouds[1].points, axis=0), atol=1e-6
+    )
     assert found.ms_per_object > 0 and list(found.confidence) == [0.2, 0.2]
     with pytest.raises(InputError, match=r"mug_004/0: estimator a raised KeyError"):
         predict_views(EstimatorService("a", answers.Raises()), views, give_cad=False)
