@@ -19,6 +19,7 @@ The camera frame is OpenCV's: x right, y down, z forward.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ def object_observation(
     intrinsics: Float[np.ndarray, "3 3"],
     camera_pose: Float[np.ndarray, "4 4"],
     seed: int,
-    mesh: dict[str, np.ndarray] | None,
+    mesh: Mapping[str, np.ndarray] | None,
 ) -> Observation:
     """The observation of one object; the keys are the module's, colours are those of the points' pixels."""
     cloud = np.asarray(points, np.float32)
@@ -63,7 +64,7 @@ def object_observation(
         "camera_pose": np.asarray(camera_pose, float),
         "seed": seed,
     }
-    return found if mesh is None else {**found, "mesh": mesh}
+    return found if mesh is None else {**found, "mesh": dict(mesh)}
 
 
 def sent_mesh(mesh: trimesh.Trimesh) -> dict[str, np.ndarray]:
