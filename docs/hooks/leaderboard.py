@@ -34,7 +34,9 @@ def tables(folder: Path = LEADERBOARD) -> str:
 def _row(card: dict[str, Any], run: dict[str, Any]) -> str:
     seeds = "frozen" if run["resample"] is None else f"resampled from {run['resample']}"
     episodes = sum(task["n"] for task in run["tasks"].values())
+    url = card["code_url"]
+    name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
     return (
-        f"| [{card['name']}]({card['code_url']}) | {run['protocol']}, {seeds} | {len(run['tasks'])} | {episodes} | "
+        f"| {name} | {run['protocol']}, {seeds} | {len(run['tasks'])} | {episodes} | "
         f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {card['training_data']} |"
     )

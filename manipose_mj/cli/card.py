@@ -26,7 +26,7 @@ def card(
       folders: Of evaluations by `manipose evaluate --protocol`; with --check, folders of cards.
       check: Recompute each card from its results and from the frozen protocol.
       name: Of the method.
-      code_url: Where its code is.
+      code_url: Where its code is: https://..., or 'this repository'.
       training_data: What it was trained on, or none.
       out: New folder for the card and copies of the results; by default the evaluation's own.
     """

@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import Any
 
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.cards.markdown import card_markdown
+from manipose_mj.evaluation.cards.markdown import OWN_CODE, card_markdown
 from manipose_mj.evaluation.cards.run_record import RunRecord, read_run
 from manipose_mj.evaluation.records import write_atomically
 from manipose_mj.evaluation.runner import RESULTS_FILE, RUN_FILE
@@ -29,7 +29,7 @@ class About:
 
     Attributes:
       name: Of the method.
-      code_url: Where its code is.
+      code_url: Where its code is: an address, or `OWN_CODE` for what comes with this package.
       training_data: What it was trained on, or `none`.
 
     Raises:
@@ -44,8 +44,8 @@ class About:
         for field, value in asdict(self).items():
             if not isinstance(value, str) or not value.strip() or "\n" in value:
                 raise InputError(f"{field} is {value!r}; expected one line of text")
-        if not self.code_url.startswith("https://"):
-            raise InputError(f"code_url is {self.code_url!r}; expected https://...")
+        if not self.code_url.startswith("https://") and self.code_url != OWN_CODE:
+            raise InputError(f"code_url is {self.code_url!r}; expected https://... or {OWN_CODE!r}")
 
 
 def make_card(folders: Sequence[Path], about: About, out: Path | None = None) -> Path:

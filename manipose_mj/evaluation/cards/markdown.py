@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from typing import Any
 
 
+OWN_CODE = "this repository"
+
+
 def card_markdown(card: Mapping[str, Any]) -> str:
     """The text of `card.md`."""
+    code = card["code_url"]
     lines = [
         f"# {card['name']}",
         "",
-        f"- Code: <{card['code_url']}>",
+        f"- Code: {code if code == OWN_CODE else f'<{code}>'}",
         f"- Training data: {card['training_data']}",
         f"- Method: {method_text(card['method'])}",
     ]

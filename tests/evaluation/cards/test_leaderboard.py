@@ -42,7 +42,9 @@ def test_the_page_shows_every_card(hook):
     assert hook.PLACE not in shown
     for card in CARDS:
         content = json.loads((card / "card.json").read_text(encoding="utf-8"))
-        assert f"| [{content['name']}]" in shown and f"\n## {content['name']}\n" in shown
+        name, url = content["name"], content["code_url"]
+        linked = f"[{name}]({url})" if url.startswith("https://") else name
+        assert f"| {linked} |" in shown and f"\n## {content['name']}\n" in shown
         for run in content["runs"]:
             assert f"results sha256 `{run['results_sha256'][:16]}`" in shown
 
