@@ -37,7 +37,7 @@ def unpack(content: bytes) -> Any:
     try:
         return msgpack.unpackb(content, object_hook=_decoded, strict_map_key=False)
     except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
-        raise ValueError(f"not a msgpack message ({type(error).__name__}: {error})") from None
+        raise ValueError(f"no msgpack message ({type(error).__name__}: {error})") from None
 
 
 def _encoded(value: Any) -> Any:

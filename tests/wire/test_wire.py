@@ -45,7 +45,7 @@ def test_what_cannot_be_sent_is_refused(value):
 
 @pytest.mark.parametrize("content", [b"", b"\xc1", b"\x81\xa1", b"\x93\x01\x02\x03\x04"])
 def test_bytes_that_are_no_message(content):
-    with pytest.raises(ValueError, match="not a msgpack message"):
+    with pytest.raises(ValueError, match="no msgpack message"):
         unpack(content)
 
 
@@ -79,7 +79,7 @@ def test_a_server_that_hangs_up_is_lost():
     ("said", "message"),
     [
         ([1, 2], "answered a list; expected a dictionary"),
-        (b"\xc1", "not a msgpack message"),
+        (b"\xc1", "no msgpack message"),
         ("Traceback\nValueError: no such category", "failed: ValueError: no such category"),
     ],
 )
