@@ -48,6 +48,11 @@ class EstimatorSettings:
         return {"name": self.name, "arguments": self.keywords, "given CAD": self.give_cad}
 
     @property
+    def source(self) -> str:
+        """Where poses come from, for people."""
+        return f"estimated by {self.name}" + (", given CAD" if self.give_cad else "")
+
+    @property
     def words(self) -> list[str]:
         """Its options on the command line."""
         words = ["--estimator", self.name]

@@ -75,6 +75,8 @@ class EvaluationConfig:
     def poses(self) -> dict[str, str]:
         """What of a scene the baseline knows truly and what by estimates, for reports."""
         objects = "estimated" if self.pose == "estimated" else "true"
+        if self.estimator is not None:
+            objects = self.estimator.source
         return {"objects": objects, "furniture": "true"}
 
     @property

@@ -218,8 +218,9 @@ def test_pose_evaluate_runs_it(monkeypatch, capsys):
     (row,) = json.loads(capsys.readouterr().out)
     assert row["n"] == 2 and row["method"] == f"{HERE}:Middle" and row["given_cad"]
     assert row["origin_cm_mean"] < 10 and row["trained_on"] is None
-    assert main(words) == 0
-    assert "unseen" not in capsys.readouterr().out
+    assert main([*words, "--give-cad"]) == 0
+    shown = capsys.readouterr().out
+    assert "unseen" not in shown and "given CAD" in shown
 
 
 def test_settings_are_part_of_what_results_belong_to():

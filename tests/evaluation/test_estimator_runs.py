@@ -30,6 +30,7 @@ def test_results_say_whose_estimates_they_are_of(tmp_path):
     told = {"name": MIDDLE.name, "arguments": {"score": 0.5}, "given CAD": True}
     run, summary = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("run", "summary"))
     assert run["estimator"] == summary["estimator"] == told
+    assert summary["poses"]["objects"] == f"estimated by {MIDDLE.name}, given CAD"
     assert "--give-cad" in run["command"] and "--estimator-args" in run["command"]
     with pytest.raises(InputError, match="its results have estimator"):
         evaluate(

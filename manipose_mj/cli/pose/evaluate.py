@@ -121,7 +121,8 @@ def evaluate_pose(
     if json:
         output.write_json(rows)
         return 0
-    table = Table("category", title=f"{method}, {setting}, {labels} labels")
+    given = ", given CAD" if give_cad else ""
+    table = Table("category", title=f"{method}{given}, {setting}, {labels} labels")
     heads = (
         "n",
         "cm",
