@@ -35,5 +35,8 @@ class WorkerDiedError(RuntimeError):
     """
 
 
-class PolicyLostError(WorkerDiedError):
-    """The server of a policy went away in the middle of an evaluation; it can be resumed."""
+class ServerLostError(WorkerDiedError):
+    """The server of somebody's method went away, or failed, in the middle of work.
+
+    Nothing that was asked of it counts as its failure: the command line prints the message and exits with code 1.
+    """

@@ -44,6 +44,11 @@ def evaluate(
     base_url: Annotated[str | None, arg(metavar="URL", help_behavior_hint="")] = None,
     replay: Annotated[Path | None, arg(metavar="FILE|DIR", help_behavior_hint="")] = None,
     instruction: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    estimator: Annotated[
+        str | None, arg(metavar="MODULE:FACTORY|ws://HOST:PORT", help_behavior_hint="")
+    ] = None,
+    estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
+    give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
 ) -> int:
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
@@ -77,9 +82,15 @@ def evaluate(
         OPENAI_API_KEY.
       replay: Exchanges that an evaluation by a language model has left in DIR/exchanges.
       instruction: What the language model shall do instead of what the episode asks for.
+      estimator: Whose estimates --pose estimated means: those of what a factory of a Python module makes, or of a
+        server; by default those of the package's weights.
+      estimator_args: Keyword arguments of its factory, as a JSON object.
+      give_cad: Give it the mesh of the very object that is seen; the results say so.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
+    from manipose_mj.estimators.loading import load_estimator
+    from manipose_mj.estimators.settings import chosen_estimator
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.planner_settings import PlannerSettings
     from manipose_mj.evaluation.policy_settings import PolicySettings
@@ -120,8 +131,11 @@ def evaluate(
         policy=settings,
         resample=resample,
         planner=planning,
+        estimator=chosen_estimator(estimator, estimator_args, give_cad),
     )
     named = check_names(tasks, objects)
+    if config.estimator is not None:
+        load_estimator(config.estimator)  # before minutes are spent on building objects
     if protocol is not None:
         named = names_in_protocol(protocol, tasks, episodes)
     with cluster(dask):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import demo, doctor, evaluate, render, tasks, view
+from manipose_mj.cli import card, demo, doctor, evaluate, render, tasks, view
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.demos.app import build_app as build_demos_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
@@ -27,6 +27,7 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(demo.demo)
     app.command(evaluate.evaluate)
+    app.command(card.card)
     app.command(name="list")(tasks.list_tasks)
     app.command(render.render)
     app.command(view.view)
@@ -34,7 +35,7 @@ def build_app() -> SubcommandApp:
     app.command(
         build_demos_app(), name="demos", help="Record demonstrations, replay and export them."
     )
-    app.command(build_pose_app(), name="pose", help="Train and evaluate pose estimators.")
+    app.command(build_pose_app(), name="pose", help="Train, evaluate and score pose estimators.")
     app.command(
         build_protocol_app(),
         name="protocol",

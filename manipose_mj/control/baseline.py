@@ -23,6 +23,7 @@ from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.instructions.sentence import instruction
@@ -70,6 +71,7 @@ class Baseline:
         environment: composer.Environment,
         pose: str = "oracle",
         planner: TaskPlanner | None = None,
+        estimator: EstimatorSettings | None = None,
     ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
@@ -77,11 +79,12 @@ class Baseline:
           environment: Of one of this package's tasks, after its first reset.
           pose: Where object poses come from, one of `POSE_SOURCES`.
           planner: Makes the plans; by default by rules.
+          estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
 
         Raises:
-          InputError: There is no such source.
+          InputError: There is no such source or estimator.
         """
-        self._environment, self._pose = environment, pose
+        self._environment, self._pose, self._estimator = environment, pose, estimator
         self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
@@ -106,7 +109,7 @@ class Baseline:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
         arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        perception = make_perception(self._pose, task, physics)
+        perception = make_perception(self._pose, task, physics, self._estimator)
         return _Scene(physics.model.ptr, arm, perception)
 
     def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from manipose_mj.assets.categories import Split
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
@@ -40,6 +41,7 @@ class EvaluationConfig:
       policy: Whose episodes they are; None: the baseline's.
       resample: Base seed for other seeds of the protocol's episodes, whose objects, furniture and parts stay.
       planner: Makes the baseline's plans.
+      estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
     """
 
     tasks: tuple[str, ...]
@@ -54,6 +56,7 @@ class EvaluationConfig:
     policy: PolicySettings | None = None
     resample: int | None = None
     planner: PlannerSettings = PlannerSettings()
+    estimator: EstimatorSettings | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -71,6 +74,8 @@ class EvaluationConfig:
             )
         if self.resample is not None and (self.protocol is None or self.resample < 0):
             raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
+        if self.estimator is not None and self.pose != "estimated":
+            raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
 
@@ -89,6 +94,8 @@ class EvaluationConfig:
             source = "true" if self.policy.sees_true_poses else "none"
             return {"objects": source, "furniture": source}
         objects = "estimated" if self.pose == "estimated" else "true"
+        if self.estimator is not None:
+            objects = self.estimator.source
         return {"objects": objects, "furniture": "true"}
 
     @property
@@ -152,6 +159,7 @@ class EvaluationConfig:
             "resample": self.resample,
             "policy": self.policy and self.policy.identity,
             "planner": self.planner.identity,
+            "estimator": self.estimator and self.estimator.identity,
         }
 
     @property
@@ -162,6 +170,7 @@ class EvaluationConfig:
         if self.resample is not None:
             chosen += ["--resample", str(self.resample)]
         whose = ["--pose", self.pose, *self.planner.words]
+        whose += self.estimator.words if self.estimator is not None else []
         if self.policy is not None:
             whose = self.policy.words
         words += ["--episodes", str(self.episodes), *chosen, *whose]

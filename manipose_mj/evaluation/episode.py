@@ -14,7 +14,8 @@ from dm_control import composer
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
-from manipose_mj.errors import InputError, PolicyLostError
+from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
@@ -42,6 +43,7 @@ def run_episode(
     planner_seed: int | None = None,
     plans: int = MAX_PLANS,
     planner: PlannerSettings = BY_RULES,
+    estimator: EstimatorSettings | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -54,11 +56,13 @@ def run_episode(
       planner_seed: Of the motion planner; by default the episode's.
       plans: How many the baseline may try.
       planner: What makes them.
+      estimator: Whose estimates they are; None: those of the package's weights.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
+      ServerLostError: The estimator's server went away.
     """
-    environment, policy = environment_of(config), _baseline(config, pose, plans, planner)
+    environment, policy = environment_of(config), _baseline(config, pose, plans, planner, estimator)
     naming = Naming(config.task, episode, pose)
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
@@ -82,7 +86,7 @@ def run_policy_episode(
 
     Raises:
       InputError: Something named does not exist, or the policy's actions are those of another control mode.
-      PolicyLostError: The policy's server went away.
+      ServerLostError: The policy's server went away.
       PolicyRaisedError: The policy's code failed.
     """
     policy = _Guarded(load_policy(settings.name, settings.arguments))
@@ -248,7 +252,7 @@ class _Guarded:
     def _called(self, method: str, *arguments: Any, **named: Any) -> Any:
         try:
             return getattr(self.policy, method)(*arguments, **named)
-        except (InputError, PolicyLostError, StageFailure, MemoryError):
+        except (InputError, ServerLostError, StageFailure, MemoryError):
             raise
         except Exception as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
@@ -302,8 +306,14 @@ def environment_of(config: EnvConfig) -> TaskEnvironment:
 
 
 @lru_cache(maxsize=4)
-def _baseline(config: EnvConfig, pose: str, plans: int, planner: PlannerSettings) -> BaselinePolicy:
+def _baseline(
+    config: EnvConfig,
+    pose: str,
+    plans: int,
+    planner: PlannerSettings,
+    estimator: EstimatorSettings | None,
+) -> BaselinePolicy:
     """The baseline of the configuration's environment."""
-    policy = BaselinePolicy(pose, planner.make(), plans)
+    policy = BaselinePolicy(pose, planner.make(), plans, estimator)
     policy.attach(environment_of(config))
     return policy

@@ -91,7 +91,7 @@ class Rollout:
 
         Raises:
           InputError: The policy's actions are those of another control mode.
-          PolicyLostError: Its server went away.
+          ServerLostError: Its server went away.
         """
         step = first
         try:

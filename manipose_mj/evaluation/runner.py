@@ -15,7 +15,9 @@ from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
-from manipose_mj.errors import InputError, PolicyLostError, WorkerDiedError
+from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
+from manipose_mj.estimators.loading import load_estimator
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
@@ -59,6 +61,7 @@ class BaselineRunner:
     """The runner of every real evaluation of the baseline, in MuJoCo."""
 
     planner: PlannerSettings
+    estimator: EstimatorSettings | None = None
 
     def __call__(
         self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
@@ -67,7 +70,14 @@ class BaselineRunner:
         from manipose_mj.evaluation.episode import run_episode  # loads the simulator: workers only
 
         with _quiet_simulator():
-            return run_episode(config, spec, episode=episode, pose=pose, planner=self.planner)
+            return run_episode(
+                config,
+                spec,
+                episode=episode,
+                pose=pose,
+                planner=self.planner,
+                estimator=self.estimator,
+            )
 
 
 @dataclass(frozen=True)
@@ -125,13 +135,17 @@ def evaluate(
     Raises:
       InputError: The folder cannot be written or holds results of something else, an episode's
         input is wrong, or there is no such cluster.
-      WorkerDiedError: A worker process was killed, or a policy's server; what had ended is kept.
+      WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
     metadata = _checked_policy(config)
+    if config.estimator is not None and runner is None:
+        load_estimator(config.estimator)  # what is not there is told before anything is written
+        if config.jobs > 1 or config.dask is not None:
+            load_estimator.cache_clear()  # workers make their own
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
-        runner = BaselineRunner(config.planner)
+        runner = BaselineRunner(config.planner, config.estimator)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), _results_file(config.out) as file:
@@ -310,7 +324,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
-    except (InputError, OSError, MemoryError, PolicyLostError):
+    except (InputError, OSError, MemoryError, ServerLostError):
         raise
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)

@@ -6,7 +6,7 @@
 |---|---|
 | `protocol.py` | what a policy is, and the check of its answers |
 | `loading.py` | policies by name: `package.module:Factory`, `ws://host:port` |
-| `framing.py`, `client.py`, `server.py` | openpi's websocket framing, both ends |
+| `client.py`, `server.py` | both ends of a websocket, in the framing of `manipose_mj.wire` |
 | `baseline.py` | the baseline as a policy |
 """
 

@@ -12,6 +12,7 @@ from manipose_mj.control.baseline import MAX_PLANS, Baseline
 from manipose_mj.control.perception.pose_sources import check_pose_source
 from manipose_mj.control.planning.planner import TaskPlanner
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.policies.protocol import ActionSpace
 
 _MODE = "pd_joint_pos"
@@ -25,7 +26,11 @@ class BaselinePolicy:
     """
 
     def __init__(
-        self, pose: str = "oracle", planner: TaskPlanner | None = None, plans: int = MAX_PLANS
+        self,
+        pose: str = "oracle",
+        planner: TaskPlanner | None = None,
+        plans: int = MAX_PLANS,
+        estimator: EstimatorSettings | None = None,
     ) -> None:
         """Acts in no environment yet.
 
@@ -33,13 +38,14 @@ class BaselinePolicy:
           pose: Where it takes object poses from.
           planner: Makes its plans; by default by rules.
           plans: How many it may try.
+          estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
 
         Raises:
           InputError: There is no such source of poses.
         """
         check_pose_source(pose)
         self.pose_source = pose
-        self._planner, self._plans = planner, plans
+        self._planner, self._plans, self._estimator = planner, plans, estimator
         self._environment: composer.Environment | None = None
         self._baseline: Baseline | None = None
         self._actions: Iterator[np.ndarray] = iter(())
@@ -59,7 +65,7 @@ class BaselinePolicy:
         """Act in this environment, after its first reset, from now on."""
         if environment is not self._environment:
             self._environment = environment
-            self._baseline = Baseline(environment, self.pose_source, self._planner)
+            self._baseline = Baseline(environment, self.pose_source, self._planner, self._estimator)
         self.baseline.status = ""  # the generator of actions resets it too late for a first record
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:

@@ -18,10 +18,10 @@ from typing import Any, Literal
 from websockets.exceptions import ConnectionClosed, InvalidURI, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from manipose_mj.errors import InputError, PolicyLostError
+from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.failures import StageFailure
-from manipose_mj.policies.framing import pack, unpack
 from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.wire.framing import pack, unpack
 
 RESET = "manipose_reset"
 Dialect = Literal["openpi", "roboarena", "manipose"]
@@ -57,7 +57,7 @@ class RemotePolicy:
 
         Raises:
           InputError: Nobody answers, or not as a policy server.
-          PolicyLostError: Nobody answers any more.
+          ServerLostError: Nobody answers any more.
         """
         if self._connection is not None:
             return
@@ -86,7 +86,7 @@ class RemotePolicy:
     def _unreachable(self, reason: str) -> Exception:
         reason = " ".join(reason.split())
         if self._reached:
-            return PolicyLostError(
+            return ServerLostError(
                 f"{self.address}: the policy server answers no more ({reason}); finished episodes are kept: start "
                 "it again and repeat with --resume"
             )
@@ -120,7 +120,7 @@ class RemotePolicy:
 
         Raises:
           StageFailure: Of the stage `policy`: the server answered with an error.
-          PolicyLostError: The connection broke.
+          ServerLostError: The connection broke.
         """
         message = dict(obs)
         if self.dialect != "openpi":

@@ -16,8 +16,8 @@ from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as open_server
 
 from manipose_mj.policies.client import RESET
-from manipose_mj.policies.framing import pack, unpack
 from manipose_mj.policies.protocol import ActionSpace, Policy
+from manipose_mj.wire.framing import pack, unpack
 
 logger = logging.getLogger(__name__)
 

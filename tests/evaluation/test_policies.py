@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.cli.main import main
-from manipose_mj.errors import InputError, PolicyLostError
+from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.episode import environment_of, run_episode, run_policy_episode
 from manipose_mj.evaluation.policy_settings import PolicySettings
@@ -168,7 +168,7 @@ def test_a_server_lost_in_the_middle_can_be_resumed(tmp_path, capsys):
     out = tmp_path / "out"
     with process_serving("Dying") as address:
         lost = evaluation(out, replace(REACHING, name=address))
-        with pytest.raises(PolicyLostError, match="repeat with --resume"):
+        with pytest.raises(ServerLostError, match="repeat with --resume"):
             evaluate(lost)
     assert len(read_results(out / "results.jsonl")[0]) == 2
     load_policy.cache_clear()

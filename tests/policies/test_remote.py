@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from websockets.sync.server import serve as websocket_server
 
-from manipose_mj.errors import InputError, PolicyLostError
+from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.failures import StageFailure
 from manipose_mj.policies.client import RemotePolicy
-from manipose_mj.policies.framing import pack, unpack
 from manipose_mj.policies.protocol import ActionSpace
 from manipose_mj.policies.server import PolicyServer
+from manipose_mj.wire.framing import pack, unpack
 from tests.policies.own_policies import Answering, Raising, Reaching
 
 SPACE = ActionSpace(-np.ones(8), np.ones(8), "pd_joint_pos", 10.0)
@@ -138,10 +138,10 @@ def test_a_server_that_goes_away_is_lost():
         remote = RemotePolicy(server.address)
         remote.reset(**EPISODE)
         remote.infer(OBSERVATION)
-    with pytest.raises(PolicyLostError, match="repeat with --resume"):
+    with pytest.raises(ServerLostError, match="repeat with --resume"):
         for _ in range(3):  # what is under way may still be answered
             remote.infer(OBSERVATION)
-    with pytest.raises(PolicyLostError):
+    with pytest.raises(ServerLostError):
         remote.reset(**EPISODE)
 
 
