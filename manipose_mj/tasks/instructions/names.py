@@ -31,27 +31,21 @@ def part_words(asset: Asset, part: MovingPart) -> str:
     row = next(i for i, parts in enumerate(rows) if any(p.name == part.name for p in parts))
     beside = sorted(rows[row], key=_from_left)
     column = [p.name for p in beside].index(part.name)
-    words = [
-        _level(row, len(rows)),
-        _among(column, len(beside), ("left", "middle", "right"), "from the left"),
-        "drawer" if kind == "drawer" else "door",
-    ]
+    level, counted_up = _among(row, len(rows), ("bottom", "middle", "top"))
+    side, counted_right = _among(column, len(beside), ("left", "middle", "right"))
+    words = [level, side, "drawer" if kind == "drawer" else "door", counted_up, counted_right]
     return " ".join(word for word in words if word)
 
 
-def _level(row: int, count: int) -> str:
-    return _among(row, count, ("bottom", "middle", "top"), "from the bottom")
-
-
-def _among(index: int, count: int, names: tuple[str, str, str], counted: str) -> str:
-    """The first, the middle of three and the last have names; others are counted."""
+def _among(index: int, count: int, names: tuple[str, str, str]) -> tuple[str, str]:
+    """What tells one of a row, before the noun and behind it: the ends and the very middle have names, others are counted."""
     if count == 1:
-        return ""
+        return "", ""
     if index in (0, count - 1):
-        return names[0] if index == 0 else names[2]
-    if count == 3:
-        return names[1]
-    return f"{_ORDINALS[index]} {counted}"
+        return names[0] if index == 0 else names[2], ""
+    if 2 * index == count - 1:
+        return names[1], ""
+    return _ORDINALS[index], f"from the {names[0]}"
 
 
 def _from_left(part: MovingPart) -> float:
