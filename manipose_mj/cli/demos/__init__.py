@@ -1,1 +1,0 @@
-"""`manipose demos`: record demonstrations, replay and export them."""
