@@ -104,9 +104,11 @@ def evaluate(
       WorkerDiedError: A worker process was killed, or an estimator's server; what had ended is kept.
     """
     if config.estimator is not None and runner is simulate:
-        load_estimator(config.estimator)  # what is not there is told before anything is written
+        # What is not there is told before anything is written.
+        service = load_estimator(config.estimator)
         if config.jobs > 1 or config.dask is not None:
-            load_estimator.cache_clear()  # workers make their own
+            service.close()  # workers make their own
+            load_estimator.cache_clear()
         runner = partial(simulate, estimator=config.estimator)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
