@@ -40,3 +40,7 @@ class ServerLostError(WorkerDiedError):
 
     Nothing that was asked of it counts as its failure: the command line prints the message and exits with code 1.
     """
+
+
+class PolicyLostError(ServerLostError):
+    """The server of a policy went away in the middle of an evaluation; it can be resumed."""

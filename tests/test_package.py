@@ -19,7 +19,9 @@ PACKAGES = ("manipose_mj", "asset_pipeline")
 # Each line may import the lines below it, and itself; imports inside functions and for types count too.
 ORDER = (
     ("manipose_mj.cli",),
-    ("manipose_mj.gym", "manipose_mj.evaluation", "manipose_mj.bop"),
+    ("manipose_mj.demos",),
+    ("manipose_mj.evaluation", "manipose_mj.bop"),
+    ("manipose_mj.gym", "manipose_mj.policies"),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
     ("manipose_mj.estimators",),

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import card, demo, doctor, evaluate, render, tasks, view
+from manipose_mj.cli import card, demo, demos, doctor, evaluate, render, tasks, view
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.console.process import hush_glfw
@@ -30,6 +30,9 @@ def build_app() -> SubcommandApp:
     app.command(render.render)
     app.command(view.view)
     app.command(build_assets_app(), name="assets", help="Build, check and inspect object assets.")
+    app.command(
+        demos.build_app(), name="demos", help="Record demonstrations, replay and export them."
+    )
     app.command(build_pose_app(), name="pose", help="Train, evaluate and score pose estimators.")
     app.command(doctor.doctor)
     return app

@@ -160,7 +160,7 @@ def test_stopping_short_of_the_goal_is_a_failure(monkeypatch):
 
 
 def test_running_out_of_time_is_recorded(monkeypatch):
-    environment, _ = episode._environment(config(TARGET_POSE, obs_mode="state"), "oracle")
+    environment = episode.environment_of(config(TARGET_POSE, obs_mode="state"))
     monkeypatch.setattr(environment, "_time_limit", 0.1)
     result = _fail(monkeypatch, lambda self, seed: iter([HOLD] * 100))
     assert (result.failure, result.steps) == ("timeout", 5)
