@@ -32,7 +32,7 @@ from manipose_mj.ppf_jax.data.view_stream import (
     check_untapered,
     split_indices,
 )
-from manipose_mj.storage.staging import put_in_place, staging
+from manipose_mj.storage.staging import clear_staging, put_in_place, staging
 
 DEPTH_SCALE = 0.1  # millimetres a step of the depth images
 Report = Callable[[int, int, str], None]
@@ -70,6 +70,8 @@ def export(
         raise InputError(f"{folder}: exists; choose another --out")
     chosen = [(name, index) for name in categories for index in split_indices(name, split)]
     try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        clear_staging(folder.parent)
         with staging(folder) as scratch:
             root = scratch / "data"
             for place in ("models", "models_eval", "test"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -37,6 +38,13 @@ class RemoteEstimator:
         self.address = address
         self._client: Client | None = Client(address)
         self.metadata = self._client.metadata
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        """Hangs up; the next question connects again."""
+        if self._client is not None:
+            self._client.close()
+        self._client = None
 
     def estimate(self, observation: Observation, /) -> Mapping[str, Any]:
         """The server's answer; connects again after the server has failed on a question.
@@ -53,8 +61,7 @@ class RemoteEstimator:
         try:
             return self._client.ask(observation)
         except RemoteFailureError as error:
-            self._client.close()
-            self._client = None
+            self.close()
             raise EstimatorFailedError(str(error)) from None
 
 
@@ -68,6 +75,11 @@ class EstimatorService:
 
     def __init__(self, name: str, estimator: Estimator) -> None:
         self.name, self.estimator = name, estimator
+
+    def close(self) -> None:
+        """Hangs up, where the estimator is on a server."""
+        if isinstance(self.estimator, RemoteEstimator):
+            self.estimator.close()
 
     def estimate(self, observation: Observation) -> PoseEstimate:
         """The checked answer to an observation.

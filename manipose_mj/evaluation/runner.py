@@ -138,10 +138,7 @@ def evaluate(
       WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
     metadata = _checked_policy(config)
-    if config.estimator is not None and runner is None:
-        load_estimator(config.estimator)  # what is not there is told before anything is written
-        if config.jobs > 1 or config.dask is not None:
-            load_estimator.cache_clear()  # workers make their own
+    _check_estimator(config)
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
@@ -196,6 +193,15 @@ def _checked_policy(config: EvaluationConfig) -> dict[str, Any]:
     if config.jobs > 1 or config.dask is not None:
         load_policy.cache_clear()  # workers make their own
     return metadata_of(policy)
+
+
+def _check_estimator(config: EvaluationConfig) -> None:
+    """Make the estimator, so that what is not there is told before anything is written."""
+    if config.estimator is not None:
+        service = load_estimator(config.estimator)
+        if config.jobs > 1 or config.dask is not None:
+            service.close()  # workers make their own
+            load_estimator.cache_clear()
 
 
 @contextmanager

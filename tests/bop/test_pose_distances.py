@@ -72,7 +72,7 @@ def test_mssd_and_mspd_equal_the_published_formulas(kind):
     rng = np.random.default_rng(len(kind))
     maps, symmetries = model_symmetry(INFOS[kind]).transforms, listed(INFOS[kind])
     assert len(maps) == len(symmetries)
-    vertices = rng.normal(0, 0.04, (40, 3))
+    vertices = rng.normal(0, 0.04, (20, 3))
     for i in range(250):
         truth = random_pose(rng)
         estimate = random_pose(rng, truth if i % 2 else None)

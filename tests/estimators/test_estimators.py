@@ -193,6 +193,8 @@ def test_a_server_that_fails_on_one_object_is_asked_again():
         with pytest.raises(EstimatorFailedError, match="the server failed: ValueError: too dark"):
             service.estimate({})
         assert service.estimate({}).confidence == 0.5
+        service.close()
+        assert service.estimate({}).confidence == 0.5  # connects again
     with pytest.raises(ServerLostError):
         service.estimate({})
 

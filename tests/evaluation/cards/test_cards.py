@@ -12,6 +12,7 @@ import tests.evaluation.fake_episodes as fake
 from manipose_mj.cli.main import main
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.cards.card import check_card
+from manipose_mj.evaluation.cards.markdown import method_text
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import from_line, to_line
 from manipose_mj.evaluation.runner import evaluate
@@ -232,3 +233,19 @@ def test_runs_of_different_methods_make_no_card(results, tmp_path, capsys):
     other = evaluated(tmp_path / "other", pose="estimated")
     assert main(["card", str(results), str(other), *WORDS, "--out", str(tmp_path / "out")]) == 2
     assert "different methods" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("method", "text"),
+    [
+        ({"pose": "oracle"}, "the baseline planner with true poses"),
+        ({"pose": "estimated"}, "by the package's weights"),
+        (
+            {"pose": "estimated", "estimator": {"name": "a:B", "given CAD": True}},
+            "estimated by `a:B`, which was given the objects' meshes",
+        ),
+        ({"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+rgb"}}, "`state+rgb`"),
+    ],
+)
+def test_a_method_is_described_with_what_it_was_told(method, text):
+    assert text in method_text(method)
