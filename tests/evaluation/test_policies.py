@@ -120,6 +120,7 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     assert "own_policies.py" in note.read_text()
 
 
+@pytest.mark.full
 def test_the_baseline_is_a_policy_behind_the_same_door():
     settings = PolicySettings(
         "manipose_mj.policies.baseline:BaselinePolicy", hz=50.0, stop="horizon"
