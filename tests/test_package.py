@@ -20,6 +20,7 @@ PACKAGES = ("manipose_mj", "asset_pipeline")
 ORDER = (
     ("manipose_mj.cli",),
     ("manipose_mj.gym", "manipose_mj.evaluation"),
+    ("manipose_mj.batch",),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
     ("manipose_mj.tasks", "manipose_mj.ppf_jax"),
