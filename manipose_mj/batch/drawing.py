@@ -79,7 +79,7 @@ class _Drawing:
         self._models: list[mujoco.MjModel] = []
         self._compiled: list[dict[str, np.ndarray]] = []
         self._starts: list[Start] = []
-        self._names: list[_Names] = []
+        self._xml: tuple[str, dict[str, bytes]] = ("", {})
         self._layout: Layout | None = None
 
     def add(self, seed: int) -> None:
@@ -97,12 +97,11 @@ class _Drawing:
         }
         start = _start_of(environment, seed, scene, changed, self._slots(), observation)
         self._starts.append(start)
-        self._names.append(names)
 
     def pool(self) -> StartPool:
         layout = self._layout
         assert layout is not None
-        return StartPool(layout, tuple(self._models), tuple(self._starts))
+        return StartPool(layout, tuple(self._models), tuple(self._starts), *self._xml)
 
     def _slots(self) -> Layout:
         assert self._layout is not None
@@ -122,6 +121,9 @@ class _Drawing:
         objects = environment.scene_objects
         key = None if objects is None else objects.key
         if key not in self._scenes:
+            if not self._scenes:
+                root = environment.task.root_entity.mjcf_model
+                self._xml = root.to_xml_string(), root.get_assets()
             self._scenes[key] = len(self._models)
             compiled = mujoco.MjModel.__copy__(environment.physics.model.ptr)
             self._models.append(compiled)

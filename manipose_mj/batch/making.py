@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, Unpack
@@ -20,6 +21,9 @@ from manipose_mj.tasks.core.config import EnvConfig, EnvOptions
 ENGINES = ("auto", "c", "warp")
 EngineName = Literal["auto", "c", "warp"]
 DEFAULT_STARTS = 32
+WARP_ON_CPU = (
+    "MANIPOSE_WARP_ON_CPU"  # set: the engine `warp` runs without a GPU too, slowly, for tests
+)
 
 
 def make(
@@ -98,10 +102,14 @@ def missing_for_warp() -> str:
     absent = [n for n in ("warp", "mujoco_warp") if importlib.util.find_spec(n) is None]
     if absent:
         return f'no module {" and ".join(absent)}; pip install "manipose-mj[gpu]"'
-    if jax.default_backend() != "gpu":
+    if jax.default_backend() != "gpu" and not os.environ.get(WARP_ON_CPU):
         return 'JAX sees no NVIDIA GPU; on a machine with one, pip install "manipose-mj[gpu]"'
     return ""
 
 
 def _engine(name: str, pool: StartPool, worlds: int, processes: int) -> Engine:
+    if name == "warp":
+        from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
+
+        return WarpEngine(pool, worlds)
     return CEngine(pool, worlds, processes=processes)

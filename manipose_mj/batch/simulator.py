@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from manipose_mj.batch.measurement import Measurement, measure
+from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.mjcf.panda.servos import Servos
 from manipose_mj.tasks.core.simulation_state import (
@@ -43,18 +44,10 @@ class Simulator:
 
     def __init__(self, pool: StartPool) -> None:
         self._pool = pool
-        self._models = pool.scenes
+        self._models = RowModels(pool)
         self._substeps = pool.layout.substeps
         self._size = state_words(pool)
         self._worlds: dict[int, _World] = {}
-        self._row_of_scene: dict[int, int] = {}
-        changed: list[set[str]] = [set() for _ in pool.scenes]
-        for start in pool.starts:
-            changed[start.scene] |= set(start.model)
-        self._nominal = [
-            {name: np.array(getattr(model, name)) for name in names}
-            for model, names in zip(pool.scenes, changed, strict=True)
-        ]
 
     def advance(
         self,
@@ -89,8 +82,8 @@ class Simulator:
         targets: Float[np.ndarray, "substeps 8"],
     ) -> tuple[UInt32[np.ndarray, " words"], bool, Measurement]:
         start = self._pool.starts[row]
-        model = self._model_of(row)
-        now = self._at(world, words, row)
+        model = self._models.at(row)
+        now = self._at(world, words, row, model)
         data, follow = now.data, now.servos.follow
         for target in targets:
             follow(target)
@@ -105,29 +98,19 @@ class Simulator:
         now.words = after.tobytes()
         return after, False, measure(model, data, start.addresses)
 
-    def _at(self, world: int, words: UInt32[np.ndarray, " words"], row: int) -> _World:
+    def _at(
+        self, world: int, words: UInt32[np.ndarray, " words"], row: int, model: mujoco.MjModel
+    ) -> _World:
         """The world with its data in this state."""
         start = self._pool.starts[row]
         known = self._worlds.get(world)
         if known is None or known.scene != start.scene:
-            model = self._models[start.scene]
             data = mujoco.MjData(model)
             servos = Servos.of(model, data, start.addresses.servos)
             known = self._worlds[world] = _World(start.scene, data, servos, b"")
         if known.words != words.tobytes():
-            model = self._models[start.scene]
             write_simulation(model, known.data, unflatten(model, known.data, words.view(float)))
         return known
-
-    def _model_of(self, row: int) -> mujoco.MjModel:
-        """The model of a start's scene with the start's own fields in it."""
-        start = self._pool.starts[row]
-        model = self._models[start.scene]
-        if self._row_of_scene.get(start.scene) != row:
-            for name, nominal in self._nominal[start.scene].items():
-                getattr(model, name)[:] = start.model.get(name, nominal)
-            self._row_of_scene[start.scene] = row
-        return model
 
 
 def state_words(pool: StartPool) -> int:

@@ -102,11 +102,15 @@ class StartPool:
       layout: Of the task.
       scenes: Models; episodes change some fields of them.
       starts: One a seed.
+      xml: Of the first scene.
+      xml_assets: Files that it names.
     """
 
     layout: Layout
     scenes: tuple[mujoco.MjModel, ...]
     starts: tuple[Start, ...]
+    xml: str
+    xml_assets: dict[str, bytes]
 
     @property
     def seeds(self) -> tuple[int, ...]:
