@@ -109,7 +109,8 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
     substeps = worlds.pool.layout.substeps
     rate = count * arguments.steps / statistics.median(ours)
     bare_rate = count * arguments.steps * substeps / statistics.median(others)
-    contacts, iterations, overflowed, memory = _insight(worlds, roll(state, actions)[0])
+    last = jax.block_until_ready(roll(state, actions)[0])
+    contacts, iterations, overflowed, memory = _insight(worlds, last)
     values = (
         task,
         f"{count:,}",

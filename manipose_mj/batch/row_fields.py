@@ -89,7 +89,11 @@ class RowFields:
                 found[name].append(getattr(data, name)[geoms])
             owners.append(np.where(geoms < 0, NOBODY, start.addresses.owners[geoms]))
         stacked = {name: np.stack(values) for name, values in fields.items()}
-        self.fields = {name: table for name, table in stacked.items() if (table != table[0]).any()}
+        self.fields = {
+            name: table
+            for name, table in stacked.items()
+            if (table != getattr(self.model, name)).any()
+        }
         self.static = {name: np.stack(found[name]) for name in _STATIC}
         self.states = {name: np.stack(found[name]) for name in _STATES}
         self.owners: Int[np.ndarray, "starts geoms"] = np.stack(owners)

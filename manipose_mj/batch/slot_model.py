@@ -61,6 +61,7 @@ def slot_model(pool: StartPool) -> SlotModel:
     spec = mujoco.MjSpec.from_string(pool.xml, assets=dict(pool.xml_assets))
     slots = {body: _add_slots(spec, scenes, body) for body in changing}
     model = spec.compile()
+    _copy_options(scenes[0].opt, model.opt)
     geoms, fields = [], []
     for number, scene in enumerate(scenes):
         chosen = np.full(model.ngeom, -1)
@@ -73,6 +74,16 @@ def slot_model(pool: StartPool) -> SlotModel:
         geoms.append(chosen)
         fields.append(_filled(model, scene, number, chosen, changing))
     return SlotModel(model, tuple(geoms), tuple(fields))
+
+
+def _copy_options(source: mujoco.MjOption, target: mujoco.MjOption) -> None:
+    """The options that the scenes have now, which may be others than their XML says."""
+    for name in dir(source):
+        value = getattr(source, name)
+        if isinstance(value, np.ndarray):
+            getattr(target, name)[:] = value
+        elif isinstance(value, int | float) and not name.startswith("_"):
+            setattr(target, name, value)
 
 
 def _require_alike(pool: StartPool) -> None:
