@@ -1,6 +1,7 @@
 """Print how fast the tasks reset, step and see on one core, beside other benchmarks' tasks.
 
 python benchmarks/throughput.py [--only TASK ...] [--episodes N]
+python benchmarks/throughput.py --engine warp|c --only TASK [--worlds N ...]: see batch_throughput.py
 
 All in one run: compare ratios. Others are measured where they are installed and run: dm_control's
 `stack_2_bricks_features` (always), Gymnasium-Robotics' FetchPickAndPlace, robosuite's Lift. Every
@@ -20,6 +21,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import batch_throughput
 import mujoco
 import numpy as np
 from dm_control import manipulation
@@ -49,7 +51,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", default=[], help="domain/task")
     parser.add_argument("--episodes", type=int, default=0, help="look for growth over so many")
+    batch_throughput.add_arguments(parser)
     arguments = parser.parse_args()
+    if arguments.engine:
+        for task in arguments.only:
+            batch_throughput.measure(task, arguments)
+        return
     tasks = [t for t in suite.ALL_TASKS if not arguments.only or "/".join(t) in arguments.only]
     print(f"{machine()}; Python {platform.python_version()}, MuJoCo {mujoco.__version__}")
     runners = [_reference(), *_others(), *(_ours(*task) for task in tasks)]

@@ -22,6 +22,7 @@ ORDER = (
     ("manipose_mj.demos",),
     ("manipose_mj.evaluation", "manipose_mj.bop"),
     ("manipose_mj.gym", "manipose_mj.policies"),
+    ("manipose_mj.batch",),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
     ("manipose_mj.estimators",),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import mujoco
@@ -24,7 +23,7 @@ from manipose_mj.mjcf.panda.kinematics import (
 )
 from manipose_mj.mjcf.panda.menagerie import find_menagerie_panda, require_menagerie_panda
 from manipose_mj.mjcf.panda.model import build_panda
-from manipose_mj.mjcf.panda.speed_limits import allowed_set_points, most_motion
+from manipose_mj.mjcf.panda.servos import ServoAddresses, Servos
 
 __all__ = [
     "ACCELERATION_LIMITS",
@@ -72,7 +71,7 @@ class Panda(composer.Entity):
         self._finger_joints = [self._model.find("joint", f"finger_joint{i}") for i in (1, 2)]
         self._actuators = [self._model.find("actuator", f"actuator{i}") for i in range(1, 8)]
         self._gripper_actuator = self._model.find("actuator", "gripper")
-        self._ids: _Ids | None = None
+        self._servos: Servos | None = None
 
     def _build_observables(self) -> PandaObservables:
         return PandaObservables(self)
@@ -165,66 +164,45 @@ class Panda(composer.Entity):
         self, physics: mjcf.Physics, joints: Float[np.ndarray, "7"], opening: float
     ) -> None:
         """Writes joint angles [rad] and the opening [m] as controls, clipped to their limits."""
-        ids, control = self._model_ids(physics), physics.data.ptr.ctrl
-        control[ids.arm] = np.clip(joints, POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1])
-        control[ids.gripper] = min(max(opening, 0.0), MAX_OPENING)
+        at, control = self.servos(physics).at, physics.data.ptr.ctrl
+        control[at.arm] = np.clip(joints, POSITION_LIMITS[:, 0], POSITION_LIMITS[:, 1])
+        control[at.gripper] = min(max(opening, 0.0), MAX_OPENING)
 
     def follow_targets(self, physics: mjcf.Physics, target: Float[np.ndarray, "8"]) -> None:
-        """Applies joint angles [rad] and an opening [m], but no faster than joints and TCP may move.
-
-        To be called before every physics step. The servos of a real Panda refuse set-points that jump; here
-        they follow, as fast as is allowed. Nor do they run away from an arm that is stopped or falls behind:
-        it would be flung after them, at several times its limits, as soon as it could move again.
-        """
-        ids = self._model_ids(physics)
-        most = most_motion(ids.options.timestep)
-        ids.control[:] = allowed_set_points(
-            target[:7], ids.control, ids.joint_angles, ids.tcp_jacobian, most
-        )
-        ids.opening[0] = min(max(float(target[7]), 0.0), MAX_OPENING)
+        """Applies joint angles [rad] and an opening [m], as `Servos.follow`; before every physics step."""
+        self.servos(physics).follow(target)
 
     def servo_lag(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
         """Damping over stiffness of the joints' servos [s]."""
-        ids = self._model_ids(physics)
-        bias = ids.model.actuator_biasprm[ids.arm]
-        return bias[:, 2] / bias[:, 1]
+        return self.servos(physics).lag()
 
-    def _model_ids(self, physics: mjcf.Physics) -> _Ids:
-        """Where the robot is in a compiled model and its data, looked up once for each."""
+    def servos(self, physics: mjcf.Physics) -> Servos:
+        """The robot in a compiled model and its data, looked up once for each."""
         data = physics.data.ptr
-        if self._ids is None or self._ids.data is not data:
+        if self._servos is None or self._servos.data is not data:
             model = physics.model.ptr
             joints = np.array(physics.bind(self._joints).element_id)
-            arm = _run(physics.bind(self._actuators).element_id)
-            gripper = int(physics.bind(self._gripper_actuator).element_id)
-            angles = _run(model.jnt_qposadr[joints])
-            self._ids = _Ids(
-                model=model,
-                options=model.opt,
-                data=data,
-                arm=arm,
-                gripper=gripper,
-                angles=angles,
+            addresses = ServoAddresses(
+                arm=_run(physics.bind(self._actuators).element_id),
+                gripper=int(physics.bind(self._gripper_actuator).element_id),
+                angles=_run(model.jnt_qposadr[joints]),
                 dofs=_run(model.jnt_dofadr[joints]),
                 fingers=_run(np.array(physics.bind(self._finger_joints).qposadr)),
                 tcp=int(physics.bind(self.tcp_site).element_id),
-                control=data.ctrl[arm],
-                opening=data.ctrl[gripper : gripper + 1],
-                joint_angles=data.qpos[angles],
-                jacobian=np.zeros((3, model.nv)),
             )
-        return self._ids
+            self._servos = Servos.of(model, data, addresses)
+        return self._servos
 
     def configuration(self, physics: mjcf.Physics) -> tuple[Float[np.ndarray, "7"], float]:
         """The joint angles [rad] and the opening [m] now."""
-        ids, positions = self._model_ids(physics), physics.data.ptr.qpos
-        return positions[ids.angles].copy(), float(positions[ids.fingers].sum())
+        at, positions = self.servos(physics).at, physics.data.ptr.qpos
+        return positions[at.angles].copy(), float(positions[at.fingers].sum())
 
     def tcp_vector(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
         """The tool centre point's pose in the world frame: position [m], then quaternion wxyz."""
         if physics.is_dirty:
             physics.forward()
-        site, data = self._model_ids(physics).tcp, physics.data.ptr
+        site, data = self.servos(physics).at.tcp, physics.data.ptr
         vector = np.empty(7)
         vector[:3] = data.site_xpos[site]
         mujoco.mju_mat2Quat(vector[3:], data.site_xmat[site])
@@ -240,35 +218,6 @@ class Panda(composer.Entity):
         pose[:3, :3] = np.reshape(site.xmat, (3, 3))
         pose[:3, 3] = site.xpos
         return pose
-
-
-@dataclass(frozen=True)
-class _Ids:
-    """Where the robot is in a model and its data.
-
-    Attributes: model; options, the model's; data; arm, gripper, actuators; angles, fingers, in qpos; dofs, in
-    qvel; tcp, the site; control, opening, joint_angles, views of the controls and angles in `data`; jacobian,
-    room for the site's Jacobian.
-    """
-
-    model: mujoco.MjModel
-    options: mujoco.MjOption
-    data: mujoco.MjData
-    arm: slice
-    gripper: int
-    angles: slice
-    dofs: slice
-    fingers: slice
-    tcp: int
-    control: Float[np.ndarray, "7"]
-    opening: Float[np.ndarray, "1"]
-    joint_angles: Float[np.ndarray, "7"]
-    jacobian: Float[np.ndarray, "3 nv"]
-
-    def tcp_jacobian(self) -> Float[np.ndarray, "3 7"]:
-        """Of the TCP's position by the arm's joints [m/rad]; overwritten by the next call."""
-        mujoco.mj_jacSite(self.model, self.data, self.jacobian, None, self.tcp)
-        return self.jacobian[:, self.dofs]
 
 
 def _run(indices: Int[np.ndarray, "n"]) -> slice:

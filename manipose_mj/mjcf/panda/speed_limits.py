@@ -21,8 +21,8 @@ from manipose_mj.poses import Array, namespace
 
 _LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
 # A servo whose set-point stays this far ahead drives its joint, or the TCP, at the limit of its speed.
-_JOINT_LEADS = SERVO_LAG * VELOCITY_LIMITS  # [rad]
-_TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
+JOINT_LEADS = SERVO_LAG * VELOCITY_LIMITS  # [rad]
+TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
 # The TCP is never further than this from each joint's axis [m].
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
 _REACH = np.cumsum(_LINKS[::-1])[::-1]
@@ -55,11 +55,11 @@ def allowed_set_points(
     """
     xp = namespace(targets)
     allowed = xp.minimum(xp.maximum(targets, set_points - most), set_points + most)
-    allowed = xp.minimum(xp.maximum(allowed, joints - _JOINT_LEADS), joints + _JOINT_LEADS)
+    allowed = xp.minimum(xp.maximum(allowed, joints - JOINT_LEADS), joints + JOINT_LEADS)
     leads = allowed - joints
-    if xp is not np or np.abs(leads).dot(_REACH) > _TCP_LEAD:
+    if xp is not np or np.abs(leads).dot(_REACH) > TCP_LEAD:
         motion = tcp_jacobian().dot(leads)
         length = xp.sqrt(motion.dot(motion))
-        slowed = joints + (_TCP_LEAD / xp.maximum(length, _TCP_LEAD)) * leads
-        allowed = xp.where(length > _TCP_LEAD, slowed, allowed)
+        slowed = joints + (TCP_LEAD / xp.maximum(length, TCP_LEAD)) * leads
+        allowed = xp.where(length > TCP_LEAD, slowed, allowed)
     return xp.minimum(xp.maximum(allowed, _LOWEST), _HIGHEST)

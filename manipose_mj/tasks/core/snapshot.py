@@ -14,10 +14,16 @@ from jaxtyping import Float
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.scene_objects import SceneObjects
+from manipose_mj.tasks.core.simulation_state import (
+    SimulationState,
+    read_simulation,
+    state_size,
+    write_simulation,
+)
 from manipose_mj.tasks.core.task import ManipulationTask
 
 # What an episode may change in a model: where fixed things stand, who has weight, randomisation.
-_MODEL_FIELDS = (
+MODEL_FIELDS = (
     "body_pos",
     "body_quat",
     "body_ipos",
@@ -47,19 +53,6 @@ _MODEL_FIELDS = (
     "cam_quat",
     "cam_fovy",
 )
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_ASLEEP = (
-    "tree_asleep",
-    "tree_awake",
-    "body_awake",
-    "body_awake_ind",
-    "parent_awake_ind",
-    "dof_awake_ind",
-)
-_AWAKE_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
-# What the second half of the last step computed, which observations show; and the servos' speeds, which
-# dm_control leaves at zero when it resets.
-_LEFT_BEHIND = ("actuator_velocity", "actuator_force", "qacc", "sensordata")
 
 
 @dataclass(frozen=True)
@@ -67,11 +60,8 @@ class Snapshot:
     """All that the rest of an episode depends on; arrays and plain values, so it can be pickled.
 
     Attributes:
-      state: MuJoCo's integration state.
+      simulation: All of MuJoCo's data that count.
       model: Fields of the model that an episode may change.
-      asleep: Which bodies are asleep, and how long the others have rested.
-      awake: How many are not.
-      left_behind: What the last step computed on its way.
       memory: What the control mode remembers.
       task: What the task remembers of this episode.
       random_state: Of the environment's one generator.
@@ -80,11 +70,8 @@ class Snapshot:
       objects: Of the scene; None where all episodes have the same.
     """
 
-    state: Float[np.ndarray, "n"]
+    simulation: SimulationState
     model: dict[str, np.ndarray]
-    asleep: dict[str, np.ndarray]
-    awake: dict[str, int]
-    left_behind: dict[str, np.ndarray]
     memory: Float[np.ndarray, "m"]
     task: dict[str, Any]
     random_state: Any
@@ -100,14 +87,9 @@ def save(environment: composer.Environment) -> Snapshot:
       InputError: It has not been reset yet.
     """
     task, model, data = _parts(environment)
-    state = np.empty(mujoco.mj_stateSize(model, _STATE))
-    mujoco.mj_getState(model, data, state, _STATE)
     return Snapshot(
-        state=state,
-        model={name: np.array(getattr(model, name)) for name in _MODEL_FIELDS},
-        asleep={name: np.array(getattr(data, name)) for name in _ASLEEP},
-        awake={name: int(getattr(data, name)) for name in _AWAKE_COUNTS},
-        left_behind={name: np.array(getattr(data, name)) for name in _LEFT_BEHIND},
+        simulation=read_simulation(model, data),
+        model={name: np.array(getattr(model, name)) for name in MODEL_FIELDS},
         memory=task.control_mode.memory(),
         task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
         random_state=environment.random_state.get_state(),
@@ -131,30 +113,18 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     if same_task and snapshot.objects is not None and isinstance(environment, TaskEnvironment):
         environment.use(snapshot.objects)
         task, model, data = _parts(environment)
-    expected = mujoco.mj_stateSize(model, _STATE)
-    shapes = {name: getattr(model, name).shape for name in _MODEL_FIELDS}
-    if len(snapshot.state) != expected or any(
+    expected, found = state_size(model), len(snapshot.simulation.state)
+    shapes = {name: getattr(model, name).shape for name in MODEL_FIELDS}
+    if found != expected or any(
         snapshot.model[name].shape != shape for name, shape in shapes.items()
     ):
         raise InputError(
-            f"snapshot of {len(snapshot.state)} state values; this environment has {expected}: "
+            f"snapshot of {found} state values; this environment has {expected}: "
             f"restore it in one of {snapshot.name} with the same options"
         )
     for name, values in snapshot.model.items():
         getattr(model, name)[:] = values
-    mujoco.mj_resetData(model, data)
-    mujoco.mj_setState(model, data, snapshot.state, _STATE)
-    # Who sleeps is no part of MuJoCo's state: bodies that do are not moved, so all are put in place first.
-    mujoco.mj_forward(model, data)
-    for name, values in snapshot.asleep.items():
-        getattr(data, name)[:] = values
-    for name, count in snapshot.awake.items():
-        setattr(data, name, count)
-    mujoco.mj_setState(model, data, snapshot.state, _STATE)
-    # The first half of a step: what dm_control leaves behind after each.
-    mujoco.mj_step1(model, data)
-    for name, values in snapshot.left_behind.items():
-        getattr(data, name)[:] = values
+    write_simulation(model, data, snapshot.simulation)
     task.__dict__.update(copy.deepcopy(snapshot.task))
     task.control_mode.remember(snapshot.memory)
     task.forget_images()

@@ -82,7 +82,7 @@ class PoseObservables:
             sorted({part.name for piece in slots.furniture for part in piece.asset.parts})
         )
         self._cache = StepCache()
-        self._bodies: _Bodies | None = None
+        self._bodies: FrameCarriers | None = None
 
     def observables(self) -> dict[str, Declared]:
         """Of every name; without the mode's prefix."""
@@ -126,7 +126,7 @@ class PoseObservables:
 
     def _measured(self, physics: mjcf.Physics) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """All poses in the world `(n, 4, 4)`, in the robot's frame, in the cameras' `(n, c, 4, 4)`."""
-        bodies, data = self._carriers(physics), physics.data
+        bodies, data = self.carriers(physics), physics.data
         rotations = data.xmat[bodies.ids].reshape(-1, 3, 3)
         world = np.zeros((len(self._names), 4, 4))
         world_frames = compose(rotations, data.xpos[bodies.ids]) @ bodies.poses
@@ -156,13 +156,18 @@ class PoseObservables:
         shifted = poses[:, :3, 3] + errors[:, :3] * self._noise.translation
         return compose(poses[:, :3, :3] @ turns, shifted)
 
-    def _carriers(self, physics: mjcf.Physics) -> _Bodies:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all frames that there may be: objects, parts, then goals."""
+        return self._names
+
+    def carriers(self, physics: mjcf.Physics) -> FrameCarriers:
+        """Which of the names this episode has, and what carries them."""
         if self._bodies is None:
             self._bodies = self._found(physics)
         return self._bodies
 
-    def _found(self, physics: mjcf.Physics) -> _Bodies:
-        """Which of the names this episode has, and what carries them."""
+    def _found(self, physics: mjcf.Physics) -> FrameCarriers:
         scene, slots = self._scene, self._slots
         objects = scene.objects
         frames = furniture_frames(scene.articulated_objects)
@@ -177,7 +182,7 @@ class PoseObservables:
         present = [frames[self._names[row]] for row in rows]
         groups = {n: t.symmetry for n, t in frames.items() if t.symmetry is not None}
         groups |= {name: goal.symmetry for name, goal in goals.items()}
-        return _Bodies(
+        return FrameCarriers(
             rows=np.array(rows, int),
             ids=np.array([int(physics.bind(t.body).element_id) for t in present], int),
             poses=np.stack([t.pose for t in present]) if present else np.zeros((0, 4, 4)),
@@ -193,23 +198,23 @@ class PoseObservables:
     def _symmetry(
         self, physics: mjcf.Physics, name: str
     ) -> tuple[Float[np.ndarray, "24 3 3"], list[int], list[bool]]:
-        group = self._carriers(physics).symmetries.get(name)
+        group = self.carriers(physics).symmetries.get(name)
         if group is None:
             return np.zeros((MAX_TURNS, 3, 3)), [0], [False]
         return group
 
     def _counts(self, physics: mjcf.Physics, name: str) -> tuple[bool, bool]:
-        goal = self._carriers(physics).goals.get(name)
+        goal = self.carriers(physics).goals.get(name)
         return (False, False) if goal is None else (goal.translation_counts, goal.rotation_counts)
 
     def _opening(self, physics: mjcf.Physics, part: str) -> float:
         """The joint's position [m or rad]; 0 for a part that the episode does not have."""
-        address = self._carriers(physics).openings.get(part)
+        address = self.carriers(physics).openings.get(part)
         return 0.0 if address is None else float(physics.data.qpos[address])
 
 
 @dataclass(frozen=True)
-class _Bodies:
+class FrameCarriers:
     """An episode's frames: `rows` among the names, body `ids`, `T_body_frame`; its goals."""
 
     rows: Int[np.ndarray, "n"]

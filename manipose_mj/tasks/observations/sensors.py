@@ -116,6 +116,11 @@ class SensorObservables:
         """All cameras' points as one cloud of fixed size; instance 0 is the surroundings."""
         return self._clouds.fused(physics)
 
+    @property
+    def poses(self) -> PoseObservables:
+        """What the mode `pose` shows."""
+        return self._poses
+
     def forget(self) -> None:
         """An episode begins, or the state was changed from outside."""
         self._rig.forget(self._scene.noise_seed or 0)

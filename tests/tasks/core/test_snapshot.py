@@ -105,6 +105,6 @@ def test_a_snapshot_of_another_scene_is_refused():
         save(first)
     first.reset()
     second.reset()
-    if len(save(first).state) != len(save(second).state):
+    if len(save(first).simulation.state) != len(save(second).simulation.state):
         with pytest.raises(InputError, match="restore it in one of "):
             restore(second, save(first))

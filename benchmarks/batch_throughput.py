@@ -1,0 +1,200 @@
+"""Print how fast batched worlds step, beside the bare physics of the same model, options and states.
+
+python benchmarks/throughput.py --engine warp|c [--only TASK] [--worlds N ...] [--objects NAME ...]
+
+Both loops run in one process, in turns; medians of the turns. The bare loop of MuJoCo Warp is one captured graph a
+control step: `step1`, then `step2` and `step1` for every physics step, with the set-points that our loop sent. Figures
+count only without overflow and divergence, which are printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from manipose_mj import batch
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.evaluation.statistics import machine
+from manipose_mj.tasks.core.config import EnvConfig
+
+TURNS = 5
+HELD = 25  # control steps for which a random target is held
+SPREAD = 0.6  # of random targets about the start [rad]
+COLUMNS = (
+    "task", "worlds", "environment steps/s", "physics steps/s", "bare physics steps/s", "share", "contacts",
+    "iterations", "overflowed", "diverged", "memory [GB]", "start [s]", "first step [s]",
+)  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Those of this measurement."""
+    parser.add_argument("--engine", choices=("c", "warp"), help="of batched worlds")
+    parser.add_argument("--worlds", nargs="+", type=int, default=[64])
+    parser.add_argument("--objects", nargs="+", help="names of objects, instead of all")
+    parser.add_argument("--starts", type=int, default=8, help="drawn before the measurement")
+    parser.add_argument("--pool", type=Path, help="drawn starts, read from here or written here")
+    parser.add_argument("--steps", type=int, default=50, help="control steps in a turn")
+    parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
+    parser.add_argument("--impratio", type=float, help="instead of the model's own")
+    parser.add_argument("--resets", type=float, default=0.0, help="share of worlds reset a step")
+
+
+def measure(task: str, arguments: argparse.Namespace) -> None:
+    """Print a row for each number of worlds."""
+    device = jax.devices()[0].device_kind
+    versions = f"MuJoCo {mujoco.__version__}, JAX {jax.__version__}"
+    print(f"{machine()}; {device}; Python {platform.python_version()}, {versions}")
+    pool = _pool(task, arguments)
+    for model in pool.scenes:
+        if arguments.noslip is not None:
+            model.opt.noslip_iterations = arguments.noslip
+        if arguments.impratio is not None:
+            model.opt.impratio = arguments.impratio
+    options = pool.scenes[0].opt
+    print(
+        f"{len(pool.starts)} starts of {len(pool.scenes)} scenes; {pool.scenes[0].ngeom} geoms; "
+        f"noslip {options.noslip_iterations}, impratio {options.impratio:g}; "
+        f"{arguments.steps} control steps a turn, {TURNS} turns"
+    )
+    print("| " + " | ".join(COLUMNS) + " |")
+    print("|" + " --- |" * len(COLUMNS))
+    for count in arguments.worlds:
+        _row(task, pool, count, arguments)
+
+
+def _pool(task: str, arguments: argparse.Namespace) -> StartPool:
+    if arguments.pool is not None and arguments.pool.exists():
+        return StartPool.load(arguments.pool)
+    config = EnvConfig(task, objects=arguments.objects, reward_mode="dense")
+    pool = draw_pool(config, range(arguments.starts))
+    if arguments.pool is not None:
+        pool.save(arguments.pool)
+    return pool
+
+
+def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) -> None:
+    started = time.perf_counter()
+    worlds = batch.from_pool(pool, count, arguments.engine)
+    made = time.perf_counter() - started
+    state = worlds.reset(jax.random.key(0))
+    actions = _actions(state, arguments.steps)
+    started = time.perf_counter()
+    jax.block_until_ready(worlds.step(state, actions[0]))
+    first = time.perf_counter() - started
+    roll = jax.jit(lambda state, actions: worlds.rollout(actions, state))
+    # Half of the episodes begun long ago: arms are where the targets have brought them.
+    state, _ = roll(state, actions)
+    jax.block_until_ready(roll(state, actions))
+    if arguments.resets:
+        horizon = worlds.pool.layout.horizon
+        spread = jnp.arange(count) % round(1 / arguments.resets)
+        state = state._replace(count=horizon - 1 - spread.astype(jnp.int32))
+    bare = _bare(worlds, state, actions)
+    ours, others, ended = [], [], []
+    for _ in range(TURNS):
+        seconds, (_, seen) = _timed(lambda: roll(state, actions))
+        ours.append(seconds)
+        ended.append(int(seen.terminated.sum()))
+        others.append(_timed(bare)[0] if bare else float("nan"))
+    substeps = worlds.pool.layout.substeps
+    rate = count * arguments.steps / statistics.median(ours)
+    bare_rate = count * arguments.steps * substeps / statistics.median(others)
+    last = jax.block_until_ready(roll(state, actions)[0])
+    contacts, iterations, overflowed, memory = _insight(worlds, last)
+    values = (
+        task,
+        f"{count:,}",
+        f"{rate:,.0f}",
+        f"{rate * substeps:,.0f}",
+        f"{bare_rate:,.0f}",
+        f"{rate * substeps / bare_rate:.2f}",
+        contacts,
+        iterations,
+        overflowed,
+        max(ended),
+        memory,
+        f"{made:.1f}",
+        f"{first:.1f}",
+    )
+    print("| " + " | ".join(map(str, values)) + " |", flush=True)
+    worlds.close()
+
+
+def _actions(state: batch.State, steps: int) -> jax.Array:
+    """Joint targets about where the arms start, and openings, each held for a while."""
+    joints = state.measurement.joints
+    held = -(-steps // HELD)
+    keys = jax.random.split(jax.random.key(1), 2)
+    arm = joints + SPREAD * jax.random.uniform(keys[0], (held, *joints.shape), minval=-1.0)
+    opening = jax.random.uniform(keys[1], (held, len(joints), 1), maxval=0.08)
+    return jnp.repeat(jnp.concatenate([arm, opening], axis=-1), HELD, axis=0)[:steps]
+
+
+def _bare(
+    worlds: batch.Worlds, state: batch.State, actions: jax.Array
+) -> Callable[[], object] | None:
+    """The physics alone of the same states and set-points; None where the engine has no other way."""
+    engine = worlds.engine
+    if engine.name == "c":
+        return None
+
+    def sent(state: batch.State, action: jax.Array) -> tuple[batch.State, jax.Array]:
+        state = worlds.step(state, action)
+        return state, state.simulation["ctrl"]
+
+    set_points = jax.block_until_ready(jax.jit(lambda s: jax.lax.scan(sent, s, actions)[1])(state))
+    import mujoco_warp
+    import warp as wp
+
+    model, data = engine._model, engine._data
+    given = [wp.from_jax(each) for each in set_points]
+    with wp.ScopedCapture(device=engine._device) as capture:
+        mujoco_warp.step1(model, data)
+        for _ in range(worlds.pool.layout.substeps):
+            mujoco_warp.step2(model, data)
+            mujoco_warp.step1(model, data)
+    start = {n: wp.clone(wp.from_jax(state.simulation[n])) for n in ("qpos", "qvel")}
+
+    def run() -> None:
+        for name, values in start.items():
+            wp.copy(getattr(data, name), values)
+        for ctrl in given:
+            wp.copy(data.ctrl, ctrl)
+            wp.capture_launch(capture.graph)
+        wp.synchronize_device(engine._device)
+
+    run()
+    return run
+
+
+def _insight(worlds: batch.Worlds, state: batch.State) -> tuple[str, str, str, str]:
+    """Contacts a world, solver iterations, worlds that overflowed, memory."""
+    engine = worlds.engine
+    if engine.name == "c":
+        return "-", "-", "0", "-"
+    import warp as wp
+
+    data = engine._data
+    contacts = int(data.nacon.numpy()[0]) / worlds.count
+    iterations = float(data.solver_niter.numpy().mean())
+    overflowed = int(np.count_nonzero(np.asarray(state.simulation["overflow"])))
+    device = engine._device
+    used = (device.total_memory - device.free_memory) / 1e9 if device.is_cuda else 0.0
+    wp.synchronize_device(device)
+    return f"{contacts:.1f}", f"{iterations:.1f}", str(overflowed), f"{used:.1f}"
+
+
+def _timed(work: Callable[[], object]) -> tuple[float, object]:
+    started = time.perf_counter()
+    result = jax.block_until_ready(work())
+    return time.perf_counter() - started, result

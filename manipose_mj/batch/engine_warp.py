@@ -1,0 +1,252 @@
+"""The engine `warp`: MuJoCo Warp called from JAX, one captured graph a control step."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import mujoco_warp  # pyright: ignore[reportMissingImports]
+import numpy as np
+import warp as wp  # pyright: ignore[reportMissingImports]
+from jaxtyping import Bool, Float, Int
+
+from manipose_mj.assets.franka_hand import MAX_OPENING
+from manipose_mj.batch import warp_kernels as kernels
+from manipose_mj.batch.measurement import Measurement
+from manipose_mj.batch.row_fields import Capacity, RowFields
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
+from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, most_motion
+from manipose_mj.poses import Array
+
+Physics = dict[str, Array]
+_FASTEST = 1e3  # nothing in a scene moves at this speed [m/s, rad/s]; what does has diverged
+_MOVING = ("qpos", "qvel", "ctrl", "qacc_warmstart")  # the state of a world
+# What measurements are made of, as MuJoCo's data have them.
+_READ = ("xpos", "xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "actuator_force")
+
+
+class WarpEngine:
+    """All worlds in one `mujoco_warp.Data`, which is scratch: states are arguments and results."""
+
+    name = "warp"
+
+    def __init__(self, pool: StartPool, worlds: int, capacity: Capacity | None = None) -> None:
+        """Copies the model to the device and compiles the kernels.
+
+        Args:
+          pool: Of starts.
+          worlds: How many there are.
+          capacity: Room for contacts and constraints; None: estimated from the starts.
+
+        Raises:
+          InputError: The pool has several scenes that no model can stand for.
+        """
+        self._pool, self._worlds = pool, worlds
+        self._fields = RowFields(pool)
+        model = self._fields.model
+        self.capacity = capacity = capacity or self._fields.capacity(worlds)
+        self._device = wp.device_from_jax(jax.devices()[0])
+        with wp.ScopedDevice(self._device):
+            self._model = mujoco_warp.put_model(model)
+            self._model.opt.warn_overflow = 0  # it is reported, not printed
+            self._data = mujoco_warp.make_data(
+                model, nworld=worlds, naconmax=capacity.contacts, njmax=capacity.constraints
+            )
+            self._tables = self._fields.to_device(self._model, self._data, worlds)
+            self._prepare_robot(model)
+            self._rows = wp.full(worlds, -1, dtype=int)
+            self._changed = wp.zeros(worlds, dtype=int)
+            self._owners = wp.array(self._fields.owners, dtype=int)
+        self._owned = len(pool.layout.objects) + len(pool.layout.parts)
+        self._addresses = jax.tree.map(jnp.asarray, self._fields.addresses)
+        self._call = self._compiled(model)
+
+    def starts(self) -> Physics:
+        return {name: jnp.asarray(v, jnp.float32) for name, v in self._fields.states.items()} | {
+            "overflow": jnp.zeros(len(self._pool.starts), jnp.int32)
+        }
+
+    def advance(
+        self,
+        physics: Physics,
+        rows: Int[Array, " worlds"],
+        targets: Float[Array, "worlds substeps 8"],
+    ) -> tuple[Physics, Bool[Array, " worlds"], Measurement]:
+        found = self._call(rows, targets, *(physics[name] for name in _MOVING))
+        after = dict(
+            zip((*_MOVING, *_READ, "contacts", "diverged", "overflow"), found, strict=True)
+        )
+        kept = {name: after[name] for name in _MOVING}
+        kept["overflow"] = physics["overflow"] | after["overflow"]
+        return kept, after["diverged"] > 0, self._measured(rows, after)
+
+    def close(self) -> None:
+        wp.clear_jax_callable_graph_cache(self._call)
+
+    def _measured(self, rows: Int[Array, " worlds"], now: dict[str, Array]) -> Measurement:
+        """Of the simulator's arrays, what each world's start says."""
+        at, servos = self._addresses, self._pool.starts[0].addresses.servos
+
+        def each(array: Array, index: Array) -> Array:
+            return jax.vmap(lambda values, chosen: values[chosen])(array, index[rows])
+
+        qpos, qvel = now["qpos"], now["qvel"]
+        return Measurement(
+            joints=qpos[:, servos.angles],
+            velocities=qvel[:, servos.dofs],
+            torques=now["actuator_force"][:, servos.arm],
+            fingers=qpos[:, servos.fingers],
+            tcp_position=now["site_xpos"][:, servos.tcp],
+            tcp_rotation=now["site_xmat"][:, servos.tcp],
+            positions=each(now["xpos"], at["bodies"]),
+            rotations=each(now["xmat"], at["bodies"]),
+            speeds=each(qvel, at["dofs"][..., None] + jnp.arange(6)),
+            openings=each(qpos, at["openings"]),
+            contacts=now["contacts"].reshape(self._worlds, 3, self._owned) > 0,
+            camera_positions=each(now["cam_xpos"], at["cameras"]),
+            camera_rotations=each(now["cam_xmat"], at["cameras"]),
+        )
+
+    def _prepare_robot(self, model: mujoco.MjModel) -> None:
+        servos = self._pool.starts[0].addresses.servos
+        angles = np.arange(servos.angles.start, servos.angles.stop)
+        joints = [int(np.flatnonzero(model.jnt_qposadr == a)[0]) for a in angles]
+        limits = np.stack(
+            [most_motion(model.opt.timestep), JOINT_LEADS, *POSITION_LIMITS.T], axis=1
+        )
+        self._joints = wp.array(np.array(joints), dtype=int)
+        self._angles = wp.array(angles, dtype=int)
+        self._limits = wp.array(limits, dtype=float)
+        self._servos = servos
+
+    def _step(self, targets: Any) -> None:
+        """The physics steps of one control step; nothing is read back from the device."""
+        model, data, servos = self._model, self._data, self._servos
+        mujoco_warp.step1(model, data)
+        for substep in range(self._pool.layout.substeps):
+            wp.launch(
+                kernels.limit_set_points,
+                dim=self._worlds,
+                inputs=[
+                    targets,
+                    substep,
+                    data.qpos,
+                    data.site_xpos,
+                    data.xanchor,
+                    data.xaxis,
+                    self._joints,
+                    self._angles,
+                    self._limits,
+                    servos.tcp,
+                    servos.arm.start,
+                    servos.gripper,
+                    float(TCP_LEAD),
+                    float(MAX_OPENING),
+                ],
+                outputs=[data.ctrl],
+            )
+            # The second half of a step, then the first of the next, as the CPU's environment steps.
+            mujoco_warp.step2(model, data)
+            mujoco_warp.step1(model, data)
+
+    def _take_starts(self, rows: Any) -> None:
+        """Where a world's start is another one than before, give the model the fields of that."""
+        changed = self._changed
+        wp.launch(kernels.find_changed, self._worlds, inputs=[rows], outputs=[self._rows, changed])
+        for table, field in self._tables:
+            kernel = kernels.copy_integers if table.dtype == wp.int32 else kernels.copy_reals
+            wp.launch(kernel, field.shape, inputs=[rows, changed, table], outputs=[field])
+
+    def _read(self, rows: Any, contacts: Any, diverged: Any) -> None:
+        data = self._data
+        contacts.zero_()
+        wp.launch(
+            kernels.find_contacts,
+            dim=data.naconmax,
+            inputs=[
+                data.nacon,
+                data.contact.worldid,
+                data.contact.geom,
+                rows,
+                self._owners,
+                self._owned,
+            ],
+            outputs=[contacts],
+        )
+        wp.launch(
+            kernels.find_diverged,
+            dim=self._worlds,
+            inputs=[data.qpos, data.qvel, _FASTEST],
+            outputs=[diverged],
+        )
+
+    def _compiled(self, model: mujoco.MjModel) -> Any:
+        """The control step as a function that JAX can call."""
+        data = self._data
+
+        def control_step(
+            rows: wp.array(dtype=int),
+            targets: wp.array3d(dtype=float),
+            qpos: wp.array2d(dtype=float),
+            qvel: wp.array2d(dtype=float),
+            ctrl: wp.array2d(dtype=float),
+            qacc_warmstart: wp.array2d(dtype=float),
+            qpos_after: wp.array2d(dtype=float),
+            qvel_after: wp.array2d(dtype=float),
+            ctrl_after: wp.array2d(dtype=float),
+            qacc_warmstart_after: wp.array2d(dtype=float),
+            xpos: wp.array2d(dtype=wp.vec3),
+            xmat: wp.array2d(dtype=wp.mat33),
+            site_xpos: wp.array2d(dtype=wp.vec3),
+            site_xmat: wp.array2d(dtype=wp.mat33),
+            cam_xpos: wp.array2d(dtype=wp.vec3),
+            cam_xmat: wp.array2d(dtype=wp.mat33),
+            actuator_force: wp.array2d(dtype=float),
+            contacts: wp.array2d(dtype=int),
+            diverged: wp.array(dtype=int),
+            overflow: wp.array(dtype=int),
+        ):
+            self._take_starts(rows)
+            for name, given in zip(_MOVING, (qpos, qvel, ctrl, qacc_warmstart), strict=True):
+                wp.copy(getattr(data, name), given)
+            data.overflow.zero_()
+            self._step(targets)
+            self._read(rows, contacts, diverged)
+            after = (qpos_after, qvel_after, ctrl_after, qacc_warmstart_after)
+            read = (xpos, xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, actuator_force)
+            for name, out in zip((*_MOVING, *_READ), (*after, *read), strict=True):
+                wp.copy(out, getattr(data, name))
+            wp.copy(overflow, data.overflow)
+
+        self._warm_up()
+        n = self._worlds
+        dims = {
+            **{f"{name}_after": getattr(data, name).shape for name in _MOVING},
+            **{name: getattr(data, name).shape for name in _READ},
+            "contacts": (n, 3 * self._owned),
+            "diverged": n,
+            "overflow": n,
+        }
+        graphs = wp.JaxCallableGraphMode
+        return wp.jax_callable(
+            control_step,
+            num_outputs=len(dims),
+            output_dims=dims,
+            graph_mode=graphs.WARP_STAGED if self._device.is_cuda else graphs.NONE,
+        )
+
+    def _warm_up(self) -> None:
+        """Compile every kernel: none can be while a graph is captured."""
+        layout, data = self._pool.layout, self._data
+        with wp.ScopedDevice(self._device):
+            rows = wp.zeros(self._worlds, dtype=int)
+            self._take_starts(rows)
+            for name in _MOVING:
+                first = np.tile(self._fields.states[name][0], (self._worlds, 1))
+                getattr(data, name).assign(first.astype(np.float32))
+            targets = wp.zeros((self._worlds, layout.substeps, 8), dtype=float)
+            self._step(targets)
+            contacts = wp.zeros((self._worlds, 3 * self._owned), dtype=int)
+            self._read(rows, contacts, wp.zeros(self._worlds, dtype=int))
+            wp.synchronize_device()

@@ -1,0 +1,115 @@
+"""Makes batched worlds from a task's name, as `suite.load` makes one."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, Unpack
+
+import jax
+
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.engine import Engine
+from manipose_mj.batch.engine_c import CEngine
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.worlds import Worlds
+from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.tasks.core.config import EnvConfig, EnvOptions
+
+ENGINES = ("auto", "c", "warp")
+EngineName = Literal["auto", "c", "warp"]
+DEFAULT_STARTS = 32
+WARP_ON_CPU = (
+    "MANIPOSE_WARP_ON_CPU"  # set: the engine `warp` runs without a GPU too, slowly, for tests
+)
+
+
+def make(
+    task: str,
+    *,
+    worlds: int,
+    seed: int = 0,
+    seeds: Sequence[int] | None = None,
+    engine: EngineName = "auto",
+    processes: int = 1,
+    **config: Unpack[EnvOptions],
+) -> Worlds:
+    """Many worlds of a registered task.
+
+    Args:
+      task: `"domain/name"`.
+      worlds: How many.
+      seed: The first of the seeds that the worlds' episodes have: `DEFAULT_STARTS` of them, or as many as there
+        are worlds if these are fewer.
+      seeds: These instead. Each is drawn once, by the CPU task's own reset, which takes 0.1 to 1 s.
+      engine: `"c"`, MuJoCo on the CPU, bit for bit the task's physics; `"warp"`, MuJoCo Warp on an NVIDIA GPU;
+        `"auto"`, the latter where it is.
+      processes: Of the engine `c`.
+      **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
+        `objects`, `split`, `randomisation`, `sensors`.
+
+    Raises:
+      InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.
+    """
+    if seeds is None:
+        seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
+    require_worlds(worlds)
+    chosen = available_engine(engine)
+    return from_pool(
+        draw_pool(EnvConfig(task, **config), list(seeds)), worlds, chosen, processes=processes
+    )
+
+
+def from_pool(
+    pool: StartPool | Path, worlds: int, engine: EngineName = "auto", *, processes: int = 1
+) -> Worlds:
+    """Many worlds whose starts are drawn already, or were saved in a file; arguments as of `make`.
+
+    Raises:
+      InputError: The file holds no pool, or the engine cannot run here.
+    """
+    require_worlds(worlds)
+    chosen = available_engine(engine)
+    if isinstance(pool, Path):
+        pool = StartPool.load(pool)
+    return Worlds(pool, _engine(chosen, pool, worlds, processes), worlds)
+
+
+def require_worlds(worlds: int) -> None:
+    """Raises InputError where there would be none."""
+    if worlds < 1:
+        raise InputError(f"worlds is {worlds}; expected at least 1")
+
+
+def available_engine(engine: str) -> Literal["c", "warp"]:
+    """The engine of this name; of `"auto"`, the best that runs here.
+
+    Raises:
+      InputError: There is none of that name, or it cannot run here.
+    """
+    if engine not in ENGINES:
+        raise unknown_name("engine", engine, ENGINES)
+    missing = missing_for_warp()
+    if engine == "warp" and missing:
+        raise InputError(f"engine 'warp' cannot run here: {missing}")
+    return "warp" if engine == "warp" or (engine == "auto" and not missing) else "c"
+
+
+def missing_for_warp() -> str:
+    """What the engine `warp` lacks on this machine, and how to get it, in one line; empty if nothing."""
+    absent = [n for n in ("warp", "mujoco_warp") if importlib.util.find_spec(n) is None]
+    if absent:
+        return f'no module {" and ".join(absent)}; pip install "manipose-mj[gpu]"'
+    if jax.default_backend() != "gpu" and not os.environ.get(WARP_ON_CPU):
+        return 'JAX sees no NVIDIA GPU; on a machine with one, pip install "manipose-mj[gpu]"'
+    return ""
+
+
+def _engine(name: str, pool: StartPool, worlds: int, processes: int) -> Engine:
+    if name == "warp":
+        from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
+
+        return WarpEngine(pool, worlds)
+    return CEngine(pool, worlds, processes=processes)

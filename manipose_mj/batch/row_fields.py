@@ -1,0 +1,173 @@
+"""What differs between the starts of one scene, as tables by row that a GPU can copy from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Int
+
+from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.slot_model import slot_model
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
+from manipose_mj.tasks.scene.indices import NOBODY
+
+_STATES = ("qpos", "qvel", "ctrl", "qacc_warmstart")
+# Of the fields that episodes change, those that a physics step or a camera's pose depends on.
+_FIELDS = (
+    "body_pos",
+    "body_quat",
+    "body_ipos",
+    "body_iquat",
+    "body_mass",
+    "body_inertia",
+    "body_subtreemass",
+    "body_invweight0",
+    "body_gravcomp",
+    "geom_friction",
+    "geom_solref",
+    "dof_damping",
+    "dof_frictionloss",
+    "dof_invweight0",
+    "actuator_gainprm",
+    "actuator_biasprm",
+    "cam_pos",
+    "cam_quat",
+)
+# MuJoCo Warp places geoms that cannot move once, not in every world anew.
+_STATIC = ("geom_xpos", "geom_xmat")
+# Contacts and constraint rows that may come to those of a start: a hand in the midst of things.
+_MORE_CONTACTS, _MORE_ROWS = 24, 192
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """Room on the device.
+
+    Attributes: contacts: of all worlds together; constraints: rows of each world.
+    """
+
+    contacts: int
+    constraints: int
+
+
+class RowFields:
+    """Tables with a row for each start.
+
+    Attributes:
+      model: Of the scene, with nothing asleep.
+      fields: Of the model, those that differ.
+      static: Of the data, the poses of geoms.
+      states: Where each start is.
+      owners: Of the geoms, as in `Addresses`.
+      addresses: Of measurements, by name.
+    """
+
+    def __init__(self, pool: StartPool) -> None:
+        """Raises InputError where the pool's scenes differ in more than the shapes of objects."""
+        slots, models = slot_model(pool), RowModels(pool)
+        self.model = _awake(slots.model)
+        fields: dict[str, list[np.ndarray]] = {}
+        found: dict[str, list[np.ndarray]] = {name: [] for name in (*_STATIC, *_STATES)}
+        owners, sizes = [], []
+        for row, start in enumerate(pool.starts):
+            model = _awake(models.at(row))
+            data = mujoco.MjData(model)
+            write_simulation(model, data, unflatten(model, data, start.simulation))
+            sizes.append((data.ncon, data.nefc))
+            geoms = slots.geoms[start.scene]
+            for name, values in _fields_of(
+                model, geoms, slots.model, slots.fields[start.scene]
+            ).items():
+                fields.setdefault(name, []).append(values)
+            for name in _STATES:
+                found[name].append(np.array(getattr(data, name)))
+            for name in _STATIC:
+                found[name].append(getattr(data, name)[geoms])
+            owners.append(np.where(geoms < 0, NOBODY, start.addresses.owners[geoms]))
+        stacked = {name: np.stack(values) for name, values in fields.items()}
+        self.fields = {
+            name: table
+            for name, table in stacked.items()
+            if (table != getattr(self.model, name)).any()
+        }
+        self.static = {name: np.stack(found[name]) for name in _STATIC}
+        self.states = {name: np.stack(found[name]) for name in _STATES}
+        self.owners: Int[np.ndarray, "starts geoms"] = np.stack(owners)
+        self.addresses = {
+            name: np.stack([getattr(start.addresses, name) for start in pool.starts])
+            for name in ("bodies", "dofs", "openings", "cameras")
+        }
+        self._sizes = np.array(sizes)
+
+    def capacity(self, worlds: int) -> Capacity:
+        """Room for twice what the starts need, and a hand in the midst of things."""
+        contacts = 2 * float(self._sizes[:, 0].mean()) + _MORE_CONTACTS
+        rows = 2 * int(self._sizes[:, 1].max()) + _MORE_ROWS
+        return Capacity(int(contacts * worlds), rows)
+
+    def to_device(self, model: Any, data: Any, worlds: int) -> list[tuple[Any, Any]]:
+        """Give every world fields of its own in a model of MuJoCo Warp.
+
+        Returns:
+          Tables by start with the arrays by world that they are copied to.
+        """
+        import warp as wp  # pyright: ignore[reportMissingImports]
+
+        pairs = []
+        for name, table in self.fields.items():
+            shared = getattr(model, name)
+            kind = np.int32 if table.dtype.kind == "i" else np.float32
+            first = np.repeat(table[:1], worlds, axis=0).astype(kind)
+            scalar = shared.dtype in (wp.float32, wp.int32)
+            shape = (worlds, *shared.shape[1:]) if scalar else (worlds, *shared.shape[1:], -1)
+            own = wp.array(first.reshape(shape), dtype=shared.dtype)
+            setattr(model, name, own)
+            pairs.append((table, own))
+        pairs += [(table, getattr(data, name)) for name, table in self.static.items()]
+        return [_flattened(table, own, worlds) for table, own in pairs]
+
+
+def _fields_of(
+    model: mujoco.MjModel,
+    geoms: Int[np.ndarray, " geoms"],
+    slots: mujoco.MjModel,
+    filled: dict[str, np.ndarray],
+) -> dict[str, np.ndarray]:
+    """What may differ between starts, of the model with slots.
+
+    Args:
+      model: Of the start.
+      geoms: Of it, in the order of the model with slots; -1: none.
+      slots: The model with slots.
+      filled: Fields of its geoms in the start's scene.
+    """
+    fields = {name: np.array(getattr(model, name)) for name in _FIELDS}
+    for name in ("geom_friction", "geom_solref"):
+        fields[name] = np.where(geoms[:, None] < 0, getattr(slots, name), fields[name][geoms])
+    # A start may have changed the friction that its scene was compiled with.
+    return fields | {name: values for name, values in filled.items() if name not in fields}
+
+
+def _awake(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy in which nothing sleeps."""
+    copied = mujoco.MjModel.__copy__(model)
+    copied.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    return copied
+
+
+def _flattened(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:
+    """A table on the device and the array that it is copied to, both as plain numbers, the latter as a view."""
+    import warp as wp  # pyright: ignore[reportMissingImports]
+
+    whole = table.dtype.kind == "i"
+    kind, numbers = (int, np.int32) if whole else (float, np.float32)
+    flat = np.ascontiguousarray(table.reshape(len(table), -1).astype(numbers))
+    view = wp.array(
+        ptr=own.ptr, shape=(worlds, flat.shape[1]), dtype=kind, device=own.device, copy=False
+    )
+    view._owner = own  # its memory lives as long as the view
+    return wp.array(flat, dtype=kind), view

@@ -1,0 +1,254 @@
+"""One model for scenes that differ in their objects: a body's shapes become slots, filled anew in every world.
+
+MuJoCo Warp takes which mesh a geom is, its size and its pose from each world, but not its type: a body has as
+many slots of each type as any scene needs. Slots that a world leaves empty touch nothing. Visual shapes of such
+bodies are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError
+
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+# Of a geom, what MuJoCo Warp has once for all worlds; the shapes in a slot have to agree on it.
+_SHARED = ("geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group")
+_ALIKE = (*_SHARED, "geom_solmix", "geom_solref", "geom_solimp", "geom_gap")
+_EMPTY_MARGIN = -1e9  # [m]: nothing is as near
+FIELDS = (
+    "geom_dataid",
+    "geom_size",
+    "geom_aabb",
+    "geom_rbound",
+    "geom_pos",
+    "geom_quat",
+    "geom_margin",
+)
+
+
+@dataclass(frozen=True)
+class SlotModel:
+    """A model with slots, and how each scene fills them.
+
+    Attributes:
+      model: With the bodies, joints, sites, cameras and actuators of every scene.
+      geoms: For each scene, which of its geoms is in each of the model's; -1: none.
+      fields: For each scene, the `FIELDS` of the model's geoms.
+    """
+
+    model: mujoco.MjModel
+    geoms: tuple[Int[np.ndarray, " geoms"], ...]
+    fields: tuple[dict[str, np.ndarray], ...]
+
+
+def slot_model(pool: StartPool) -> SlotModel:
+    """The model for all scenes of a pool.
+
+    Raises:
+      InputError: The scenes differ in more than the shapes of bodies.
+    """
+    scenes = pool.scenes
+    if len(scenes) == 1:
+        return SlotModel(scenes[0], (np.arange(scenes[0].ngeom),), ({},))
+    _require_alike(pool)
+    changing = [body for body in range(scenes[0].nbody) if _differs(scenes, body)]
+    spec = mujoco.MjSpec.from_string(pool.xml, assets=dict(pool.xml_assets))
+    slots = {body: _add_slots(spec, scenes, body) for body in changing}
+    model = spec.compile()
+    _copy_options(scenes[0].opt, model.opt)
+    geoms, fields = [], []
+    for number, scene in enumerate(scenes):
+        chosen = np.full(model.ngeom, -1)
+        for body in range(model.nbody):
+            if body in slots:
+                for name, sources in slots[body].items():
+                    chosen[model.geom(name).id] = sources[number]
+            else:
+                chosen[_geoms(model, body)] = _geoms(scene, body)
+        geoms.append(chosen)
+        fields.append(_filled(model, scene, number, chosen, changing))
+    return SlotModel(model, tuple(geoms), tuple(fields))
+
+
+def _copy_options(source: mujoco.MjOption, target: mujoco.MjOption) -> None:
+    """The options that the scenes have now, which may be others than their XML says."""
+    for name in dir(source):
+        value = getattr(source, name)
+        if isinstance(value, np.ndarray):
+            getattr(target, name)[:] = value
+        elif isinstance(value, int | float) and not name.startswith("_"):
+            setattr(target, name, value)
+
+
+def _require_alike(pool: StartPool) -> None:
+    first = pool.scenes[0]
+    for scene in pool.scenes[1:]:
+        same = all(
+            getattr(scene, name) == getattr(first, name)
+            for name in ("nq", "nv", "nu", "nbody", "njnt", "nsite", "ncam")
+        ) and all(
+            np.array_equal(getattr(scene, name), getattr(first, name))
+            for name in ("body_parentid", "jnt_type", "jnt_bodyid", "site_bodyid", "cam_bodyid")
+        )
+        if not same:
+            raise InputError(
+                "engine 'warp' takes scenes that differ in the shapes of objects alone; these differ in bodies or "
+                "joints: name one set of furniture in `objects`, or take engine 'c'"
+            )
+
+
+def _geoms(model: mujoco.MjModel, body: int) -> Int[np.ndarray, " geoms"]:
+    return model.body_geomadr[body] + np.arange(model.body_geomnum[body])
+
+
+def _solid(model: mujoco.MjModel, body: int) -> Int[np.ndarray, " geoms"]:
+    """The geoms of a body that can touch something."""
+    geoms = _geoms(model, body)
+    return geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]
+
+
+def _differs(scenes: tuple[mujoco.MjModel, ...], body: int) -> bool:
+    """Whether a body's geoms are not the same in all scenes."""
+    first = scenes[0]
+    own = _geoms(first, body)
+    for scene in scenes[1:]:
+        other = _geoms(scene, body)
+        if len(own) != len(other) or any(
+            not np.array_equal(getattr(first, name)[own], getattr(scene, name)[other])
+            for name in ("geom_type", "geom_size", "geom_pos", "geom_quat", *_ALIKE)
+        ):
+            return True
+    return False
+
+
+def _add_slots(
+    spec: mujoco.MjSpec, scenes: tuple[mujoco.MjModel, ...], body: int
+) -> dict[str, list[int]]:
+    """Replace a body's geoms by slots.
+
+    Returns:
+      By the slots' names, the geom of each scene in it; -1: none.
+    """
+    element = spec.body(scenes[0].body(body).name)
+    for geom in list(element.geoms):
+        spec.delete(geom)
+    by_type: dict[int, list[list[int]]] = {}
+    for number, scene in enumerate(scenes):
+        counts: dict[int, int] = {}
+        for geom in _solid(scene, body).tolist():
+            kind = int(scene.geom_type[geom])
+            rows = by_type.setdefault(kind, [])
+            place = counts.get(kind, 0)
+            counts[kind] = place + 1
+            if place == len(rows):
+                rows.append([-1] * len(scenes))
+            rows[place][number] = geom
+    slots: dict[str, list[int]] = {}
+    for kind, rows in by_type.items():
+        for place, sources in enumerate(rows):
+            name = f"slot_{body}_{kind}_{place}"
+            _add_slot(spec, element, name, kind, sources, scenes)
+            slots[name] = sources
+    return slots
+
+
+def _add_slot(
+    spec: mujoco.MjSpec,
+    body: mujoco.MjsBody,
+    name: str,
+    kind: int,
+    sources: list[int],
+    scenes: tuple[mujoco.MjModel, ...],
+) -> None:
+    """One geom with the shapes of all scenes that have one there, and their meshes."""
+    number = next(i for i, geom in enumerate(sources) if geom >= 0)
+    scene, geom = scenes[number], sources[number]
+    for other, source in zip(scenes, sources, strict=True):
+        for field in _ALIKE:
+            if source >= 0 and not np.array_equal(
+                getattr(other, field)[source], getattr(scene, field)[geom]
+            ):
+                raise InputError(f"engine 'warp': objects differ in {field}; take engine 'c'")
+        if source >= 0 and kind == _MESH:
+            mesh = int(other.geom_dataid[source])
+            first, count = int(other.mesh_vertadr[mesh]), int(other.mesh_vertnum[mesh])
+            vertices = other.mesh_vert[first : first + count]
+            spec.add_mesh(
+                name=_mesh_name(scenes.index(other), source), uservert=vertices.ravel().tolist()
+            )
+    shared = {field.removeprefix("geom_"): int(getattr(scene, field)[geom]) for field in _SHARED}
+    added = body.add_geom(name=name, type=mujoco.mjtGeom(kind), **shared)
+    added.size = scene.geom_size[geom]
+    added.solref, added.solimp = scene.geom_solref[geom], scene.geom_solimp[geom]
+    added.solmix = float(scene.geom_solmix[geom])
+    added.friction = scene.geom_friction[geom]
+    added.mass = 0.0
+    if kind == _MESH:
+        added.meshname = _mesh_name(number, geom)
+
+
+def _mesh_name(scene: int, geom: int) -> str:
+    return f"slot_mesh_{scene}_{geom}"
+
+
+def _filled(
+    model: mujoco.MjModel,
+    scene: mujoco.MjModel,
+    number: int,
+    chosen: Int[np.ndarray, " geoms"],
+    changing: list[int],
+) -> dict[str, np.ndarray]:
+    """The fields of the model's geoms in this scene."""
+    fields = {name: np.array(getattr(model, name), copy=True) for name in FIELDS}
+    for geom in np.flatnonzero(np.isin(model.geom_bodyid, changing)):
+        source = int(chosen[geom])
+        if source < 0:
+            if model.geom_type[geom] == _MESH:
+                fields["geom_dataid"][geom] = -1
+            fields["geom_margin"][geom] = _EMPTY_MARGIN
+            continue
+        for name in FIELDS:
+            if name != "geom_dataid":
+                fields[name][geom] = getattr(scene, name)[source]
+        if model.geom_type[geom] == _MESH:
+            mesh = model.mesh(_mesh_name(number, source)).id
+            fields["geom_dataid"][geom] = mesh
+            position, quaternion = _moved(
+                scene.geom_pos[source], scene.geom_quat[source], model, mesh
+            )
+            fields["geom_pos"][geom], fields["geom_quat"][geom] = position, quaternion
+            box, size, radius = _bounds(model, mesh)
+            fields["geom_aabb"][geom] = box
+            fields["geom_size"][geom] = size
+            fields["geom_rbound"][geom] = radius
+    return fields
+
+
+def _moved(
+    position: Float[np.ndarray, "3"],
+    quaternion: Float[np.ndarray, "4"],
+    model: mujoco.MjModel,
+    mesh: int,
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]:
+    """The geom's pose for the mesh as it was compiled again: MuJoCo centres and turns vertices."""
+    offset, turned = np.empty(3), np.empty(4)
+    mujoco.mju_rotVecQuat(offset, model.mesh_pos[mesh], quaternion)
+    mujoco.mju_mulQuat(turned, quaternion, model.mesh_quat[mesh])
+    return position + offset, turned
+
+
+def _bounds(
+    model: mujoco.MjModel, mesh: int
+) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "3"], float]:
+    """A mesh's bounding box (middle, half lengths), half lengths about its frame, and radius [m]."""
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    vertices = model.mesh_vert[first : first + count].astype(float)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    size = np.maximum(np.abs(low), np.abs(high))
+    return np.concatenate([(low + high) / 2, (high - low) / 2]), size, float(np.linalg.norm(size))

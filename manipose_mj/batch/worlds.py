@@ -1,0 +1,296 @@
+"""Many worlds of one task behind pure functions: `reset`, `step`, `rollout`, for `jax.jit` and `jax.lax.scan`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int, PRNGKeyArray
+
+from manipose_mj.batch.commands import Commands, Controller
+from manipose_mj.batch.engine import Engine, Physics
+from manipose_mj.batch.goals import EpisodeGoals, stack_trees, take
+from manipose_mj.batch.measurement import Measurement, scene_state
+from manipose_mj.batch.observations import Observation, Observer
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError
+from manipose_mj.poses import Array
+from manipose_mj.storage.cache_file import new_cache_file
+
+Policy = Callable[[Observation, PRNGKeyArray], Float[Array, "worlds n"]]
+
+
+class State(NamedTuple):
+    """All worlds between two control steps.
+
+    Where an episode ended with the last step, `observation` is already the next one's first; everything else
+    about the step is of the episode that ended.
+
+    Attributes:
+      observation: By the names that the CPU task has.
+      final_observation: The same after the last step, before a new episode began.
+      reward: Of the last step.
+      terminated: Whether the episode ended because the simulation diverged, which is the failure `physics`.
+      truncated: Whether it ended at the horizon.
+      success: Whether the goals were met after the last step.
+      success_once: Whether they were after any step of the episode.
+      row: Of each world's start in the pool.
+      count: Control steps of the present episode.
+      succeeded: Whether its goals were met after any of them.
+      simulation: The engine's.
+      measurement: Of it.
+      commands: What the controllers remember.
+    """
+
+    observation: Observation
+    final_observation: Observation
+    reward: Float[Array, " worlds"]
+    terminated: Bool[Array, " worlds"]
+    truncated: Bool[Array, " worlds"]
+    success: Bool[Array, " worlds"]
+    success_once: Bool[Array, " worlds"]
+    row: Int[Array, " worlds"]
+    count: Int[Array, " worlds"]
+    succeeded: Bool[Array, " worlds"]
+    simulation: Physics
+    measurement: Measurement
+    commands: Commands
+
+    @property
+    def done(self) -> Bool[Array, " worlds"]:
+        """Whether an episode ended with the last step."""
+        return self.terminated | self.truncated
+
+
+class Transition(NamedTuple):
+    """What a rollout keeps of each step; as in `State`."""
+
+    action: Float[Array, "*steps worlds n"]
+    reward: Float[Array, "*steps worlds"]
+    terminated: Bool[Array, "*steps worlds"]
+    truncated: Bool[Array, "*steps worlds"]
+    success: Bool[Array, "*steps worlds"]
+    success_once: Bool[Array, "*steps worlds"]
+
+
+class Worlds:
+    """Worlds of one task on one engine.
+
+    Attributes:
+      pool: Of starts.
+      engine: Of the physics.
+      count: How many worlds.
+      lower, upper: Limits of an action.
+    """
+
+    def __init__(self, pool: StartPool, engine: Engine, count: int) -> None:
+        """Prepares; the engine has to be of the same pool and number of worlds."""
+        self.pool, self.engine, self.count = pool, engine, count
+        self._goals = EpisodeGoals([start.goals for start in pool.starts])
+        self._shapes = stack_trees([start.shapes for start in pool.starts])
+        self._measurements = stack_trees([start.measurement for start in pool.starts])
+        self._simulations = engine.starts()
+        self._observer, self._controller = Observer(pool), Controller(pool)
+        self.lower, self.upper = self._controller.lower, self._controller.upper
+        self._begin_jit, self._step_jit = jax.jit(self._begin), jax.jit(self._step)
+
+    def reset(self, key: PRNGKeyArray) -> State:
+        """Begin an episode in every world, each start of the pool equally often."""
+        rows = jax.random.permutation(key, len(self.pool.starts))
+        return self._begin_jit(jnp.resize(rows, (self.count,)))
+
+    def at(self, seeds: Sequence[int]) -> State:
+        """Begin the episodes that the CPU task begins with these seeds.
+
+        Args:
+          seeds: One a world.
+
+        Raises:
+          InputError: They are more or fewer, or the pool has no such start.
+        """
+        if len(seeds) != self.count:
+            raise InputError(f"{len(seeds)} seeds for {self.count} worlds; expected one a world")
+        return self._begin_jit(
+            jnp.asarray(self.pool.rows([int(seed) for seed in seeds]), jnp.int32)
+        )
+
+    def step(self, state: State, action: Float[Array, "worlds n"]) -> State:
+        """Go on by one control step; where an episode ends, the next start of the pool follows.
+
+        A world whose action is not finite diverges.
+        """
+        return self._step_jit(state, action)
+
+    def rollout(
+        self,
+        policy: Policy | Float[Array, "steps worlds n"],
+        state: State,
+        steps: int | None = None,
+        *,
+        key: PRNGKeyArray | None = None,
+    ) -> tuple[State, Transition]:
+        """Many control steps in one `scan`.
+
+        Args:
+          policy: A function of the observation and a key, or recorded actions.
+          state: To begin with.
+          steps: How many; all of recorded actions by default.
+          key: For the policy.
+
+        Raises:
+          InputError: A policy is given without `steps`.
+        """
+        if callable(policy):
+            if steps is None:
+                raise InputError("a rollout of a policy needs the number of steps")
+            keys = jax.random.split(jax.random.key(0) if key is None else key, steps)
+
+            def act(state: State, own: Array) -> Array:
+                return policy(state.observation, own)
+
+            inputs = keys
+        else:
+
+            def act(state: State, own: Array) -> Array:
+                return own
+
+            inputs = jnp.asarray(policy)[:steps]
+
+        def one(state: State, own: Array) -> tuple[State, Transition]:
+            action = act(state, own)
+            after = self._step_jit(state, action)
+            return after, Transition(
+                action,
+                after.reward,
+                after.terminated,
+                after.truncated,
+                after.success,
+                after.success_once,
+            )
+
+        return jax.lax.scan(one, state, inputs)
+
+    def seeds(self, state: State) -> Int[np.ndarray, " worlds"]:
+        """Of the present episodes."""
+        return np.asarray(self.pool.seeds)[np.asarray(state.row)]
+
+    def save(self, state: State, path: Path | str) -> None:
+        """Write a state to a file (`.npz`)."""
+        leaves: dict[str, Any] = {
+            f"leaf_{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))
+        }
+        with new_cache_file(Path(path)) as scratch, scratch.open("wb") as file:
+            np.savez(file, **self._identity(), **leaves)
+
+    def restore(self, path: Path | str) -> State:
+        """The state that was saved, by worlds of the same task, options, starts and number.
+
+        Raises:
+          InputError: There is none, or it is of other worlds.
+        """
+        try:
+            with np.load(path) as file:
+                saved = {name: file[name] for name in file.files}
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: no state of worlds can be read from it ({error})") from None
+        for name, own in self._identity().items():
+            if name not in saved or not np.array_equal(saved[name], own):
+                raise InputError(
+                    f"{path}: its {name} differ from these worlds'; make them with the same arguments"
+                )
+        shape = jax.eval_shape(self._begin, jnp.zeros(self.count, jnp.int32))
+        leaves = [jnp.asarray(saved[f"leaf_{i}"]) for i in range(len(jax.tree.leaves(shape)))]
+        return jax.tree.unflatten(jax.tree.structure(shape), leaves)
+
+    def close(self) -> None:
+        """Free what the engine holds."""
+        self.engine.close()
+
+    def _identity(self) -> dict[str, Any]:
+        layout = self.pool.layout
+        options = (layout.task, layout.obs_mode, layout.control_mode, layout.reward_mode)
+        return {
+            "options": np.array([*options, self.engine.name]),
+            "seeds": np.array(self.pool.seeds),
+            "worlds": np.array(self.count),
+        }
+
+    def _begin(self, rows: Int[Array, " worlds"]) -> State:
+        rows = rows.astype(jnp.int32)
+        now = take(self._measurements, rows)
+        observation = self._observer.observe(now, rows)
+        never = jnp.zeros(len(rows), bool)
+        return State(
+            observation=observation,
+            final_observation=observation,
+            reward=jnp.zeros(len(rows), jnp.float32),
+            terminated=never,
+            truncated=never,
+            success=never,
+            success_once=never,
+            row=rows,
+            count=jnp.zeros(len(rows), jnp.int32),
+            succeeded=never,
+            simulation=take(self._simulations, rows),
+            measurement=now,
+            commands=self._controller.begin(rows, now.joints, now.fingers.sum(-1)),
+        )
+
+    def _step(self, state: State, action: Float[Array, "worlds n"]) -> State:
+        layout, rows = self.pool.layout, state.row
+        action = jnp.asarray(action, jnp.float32)
+        valid = jnp.isfinite(action).all(-1)
+        action = jnp.where(valid[:, None], action, 0.0)
+        commands, targets = self._controller.command(
+            state.commands, rows, action, state.measurement.joints
+        )
+        simulation, diverged, now = self.engine.advance(state.simulation, rows, targets)
+        diverged = diverged | ~valid
+        now = _choose(diverged, state.measurement, now)
+        scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
+        success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
+        reward = self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode)
+        succeeded = state.succeeded | success
+        count = state.count + 1
+        truncated = (count >= layout.horizon) & ~diverged
+        observation = self._observer.observe(now, rows)
+        going_on = State(
+            observation=observation,
+            final_observation=observation,
+            reward=jnp.where(diverged, 0.0, reward).astype(jnp.float32),
+            terminated=diverged,
+            truncated=truncated,
+            success=success,
+            success_once=succeeded,
+            row=rows,
+            count=count,
+            succeeded=succeeded,
+            simulation=simulation,
+            measurement=now,
+            commands=commands,
+        )
+        done = diverged | truncated
+        # Where no episode ended, rows are read that are not used: a gather costs less than a branch.
+        fresh = self._begin(jnp.where(done, (rows + 1) % len(self.pool.starts), rows))
+        return going_on._replace(
+            observation=_choose(done, fresh.observation, observation),
+            row=fresh.row,
+            count=jnp.where(done, 0, count),
+            succeeded=succeeded & ~done,
+            simulation=_choose(done, fresh.simulation, simulation),
+            measurement=_choose(done, fresh.measurement, now),
+            commands=_choose(done, fresh.commands, commands),
+        )
+
+
+def _choose(which: Bool[Array, " worlds"], yes: Any, no: Any) -> Any:
+    """Of each world the one tree or the other."""
+
+    def chosen(a: Array, b: Array) -> Array:
+        return jnp.where(which.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
+
+    return jax.tree.map(chosen, yes, no)

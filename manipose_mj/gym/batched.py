@@ -1,0 +1,105 @@
+"""Batched worlds as one of Gymnasium's vector environments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.errors import InputError
+
+Infos = dict[str, Any]
+
+
+class BatchedEnv(VectorEnv):
+    """Worlds that step together; observations, rewards and infos are JAX arrays and stay where they are.
+
+    An episode that ends is followed by the next within the same step; `infos["final_obs"]` then holds what was
+    last seen of it, for the worlds that `infos["_final_obs"]` marks. `torch.from_dlpack` reads the arrays without a
+    copy. `infos` also holds `success`, `success_once` and `failure`, whether the simulation diverged.
+    """
+
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(self, worlds: Worlds) -> None:
+        """Closing the environment closes the worlds."""
+        self.worlds, self.num_envs = worlds, worlds.count
+        self._state: State | None = None
+        self._key = jax.random.key(0)
+        low, high = worlds.lower, worlds.upper
+        self.single_action_space = spaces.Box(low, high, low.shape, np.float32)
+        first = worlds.at([worlds.pool.seeds[0]] * worlds.count).observation
+        self.single_observation_space = spaces.Dict(
+            {name: _space(values) for name, values in first.items()}
+        )
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+    def reset(
+        self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, jax.Array], Infos]:
+        """Begin an episode in every world.
+
+        Args:
+          seed: A number chooses starts for all; a list, the episode of each world, of those in the pool.
+          options: None are known.
+
+        Raises:
+          InputError: An option is given, or a seed is not in the pool.
+        """
+        if options:
+            raise InputError(f"batched worlds have no reset options; got {sorted(options)}")
+        if isinstance(seed, list):
+            self._state = self.worlds.at(seed)
+        else:
+            if seed is not None:
+                self._key = jax.random.key(seed)
+            self._key, own = jax.random.split(self._key)
+            self._state = self.worlds.reset(own)
+        return self._state.observation, {}
+
+    def step(
+        self, actions: Any
+    ) -> tuple[dict[str, jax.Array], jax.Array, jax.Array, jax.Array, Infos]:
+        """Go on by one control step.
+
+        Args:
+          actions: `(worlds, n)`, of NumPy, JAX, or what speaks DLPack.
+
+        Raises:
+          InputError: No episode was begun, or the actions have another shape.
+        """
+        if self._state is None:
+            raise InputError("no episode was begun: call reset first")
+        given = actions if isinstance(actions, np.ndarray) else jax.numpy.from_dlpack(actions)
+        if given.shape != self.action_space.shape:
+            raise InputError(
+                f"actions have shape {given.shape}; expected {self.action_space.shape}"
+            )
+        self._state = state = self.worlds.step(self._state, jax.numpy.asarray(given))
+        infos = {
+            "success": state.success,
+            "success_once": state.success_once,
+            "failure": state.terminated,
+            "final_obs": state.final_observation,
+            "_final_obs": state.done,
+        }
+        return state.observation, state.reward, state.terminated, state.truncated, infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the worlds."""
+        self.worlds.close()
+
+
+def _space(values: jax.Array) -> spaces.Box:
+    """Of one world: any value of the type."""
+    kind = np.dtype(values.dtype)
+    if np.issubdtype(kind, np.floating):
+        return spaces.Box(-np.inf, np.inf, values.shape[1:], kind.type)
+    limits = np.iinfo(kind)
+    return spaces.Box(limits.min, limits.max, values.shape[1:], kind.type)

@@ -1,0 +1,96 @@
+"""The model with slots, filled as a scene fills it, is that scene: checked by MuJoCo itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.row_fields import RowFields
+from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.slot_model import slot_model
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig
+
+OBJECTS = ("mug_000", "box_000", "chips_can_000")
+TASK = "single_object/target_pose"
+
+
+@pytest.fixture(scope="module")
+def pool():
+    drawn = draw_pool(EnvConfig(TASK, objects=OBJECTS, obs_mode="state"), range(8))
+    assert len(drawn.scenes) == len(OBJECTS)
+    for scene in drawn.scenes:
+        scene.opt.impratio = 70.0  # not what the XML says
+    return drawn
+
+
+def of_row(fields: RowFields, row: int) -> mujoco.MjModel:
+    """The model with slots as a start fills it, without what C MuJoCo alone keeps from when it was compiled."""
+    model = mujoco.MjModel.__copy__(fields.model)
+    model.geom_sameframe[:] = 0
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+    for name, table in fields.fields.items():
+        values = table[row]
+        if name == "geom_dataid":
+            # It knows no absent meshes.
+            empty = (values < 0) & (model.geom_type == int(mujoco.mjtGeom.mjGEOM_MESH))
+            model.geom_contype[empty] = model.geom_conaffinity[empty] = 0
+            values = np.where(empty, model.geom_dataid, values)
+        getattr(model, name)[:] = values
+    return model
+
+
+def stepped(model: mujoco.MjModel, state: dict[str, np.ndarray], steps: int) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    for name, values in state.items():
+        getattr(data, name)[:] = values
+    data.qpos[-5] += 0.002  # the object falls by 2 mm
+    mujoco.mj_step(model, data, steps)
+    return data
+
+
+def test_every_start_moves_as_in_its_own_scene(pool):
+    fields, models = RowFields(pool), RowModels(pool)
+    seen = set()
+    for row, start in enumerate(pool.starts):
+        if start.object_name in seen:
+            continue
+        seen.add(start.object_name)
+        scene = mujoco.MjModel.__copy__(models.at(row))
+        scene.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+        state = {name: table[row] for name, table in fields.states.items()}
+        own, slots = (stepped(m, state, 60) for m in (scene, of_row(fields, row)))
+        assert own.ncon > 0 and slots.ncon > 0
+        np.testing.assert_allclose(slots.qpos, own.qpos, rtol=0, atol=2e-4)
+        named = set(start.addresses.owners) | {3}
+        assert set(fields.owners[row]) == named
+    assert seen == set(OBJECTS)
+
+
+def test_slots_keep_the_options_of_the_scenes(pool):
+    model = slot_model(pool).model
+    assert model.opt.impratio == 70.0
+    assert model.opt.cone == pool.scenes[0].opt.cone
+
+
+def test_starts_of_one_object_have_its_shape_in_every_world(pool):
+    name = pool.starts[-1].object_name
+    one = replace(pool, starts=tuple(s for s in pool.starts if s.object_name == name))
+    both = RowFields(pool)
+    row = next(i for i, s in enumerate(pool.starts) if s.object_name == name)
+    alone = of_row(RowFields(one), 0)
+    expected = of_row(both, row)
+    for field in ("geom_dataid", "geom_size", "geom_pos", "geom_margin", "body_mass"):
+        np.testing.assert_array_equal(getattr(alone, field), getattr(expected, field))
+
+
+def test_scenes_that_differ_in_more_than_shapes_are_refused(pool):
+    other = draw_pool(
+        EnvConfig("articulated/open_middle_drawer", objects=("cabinet_000",), obs_mode="state"), [0]
+    )
+    with pytest.raises(InputError, match="differ in bodies or joints"):
+        slot_model(replace(pool, scenes=(*pool.scenes, *other.scenes)))

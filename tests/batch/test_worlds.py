@@ -1,0 +1,173 @@
+"""What batched worlds do besides physics: episodes that end, rollouts, saved states, clear refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from manipose_mj import batch
+from manipose_mj.errors import InputError
+from tests.batch.batched import make, wandering
+
+TASK = "articulated/open_middle_drawer"
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    """Three worlds, with two starts, whose episodes last four steps."""
+    made = make(TASK, 3, seeds=(7, 8), reward_mode="dense")
+    short = replace(made.pool, layout=replace(made.pool.layout, horizon=4))
+    return batch.from_pool(short, 3, "c")
+
+
+def equal(one, other) -> None:
+    jax.tree.map(np.testing.assert_array_equal, one, other)
+
+
+def test_at_the_horizon_the_next_start_follows_and_the_last_observation_is_kept(worlds):
+    state = worlds.at([7, 8, 7])
+    fresh = worlds.at([8, 7, 8])
+    for count, action in enumerate(wandering(4, 3), start=1):
+        before, state = state, worlds.step(state, action)
+        assert np.all(np.asarray(state.truncated) == (count == 4))
+        assert not np.any(state.terminated)
+    assert worlds.seeds(state).tolist() == [8, 7, 8]
+    equal(state.observation, fresh.observation)
+    equal(state.simulation, fresh.simulation)
+    assert np.all(np.asarray(state.count) == 0)
+    last, joints = state.final_observation, "panda/joint_positions"
+    assert not np.array_equal(last[joints], state.observation[joints])
+    assert not np.array_equal(last[joints], before.observation[joints])
+    action = wandering(1, 3)[0]
+    equal(worlds.step(state, action).simulation, worlds.step(fresh, action).simulation)
+
+
+def test_a_diverged_world_fails_alone_and_begins_anew(worlds):
+    state = worlds.at([7, 7, 8])
+    action = wandering(1, 3)[0]
+    expected = worlds.step(state, action)
+    model = worlds.pool.scenes[0]
+    speeds = slice(1 + model.nq, 1 + model.nq + model.nv)  # after the time and qpos
+    broken = np.array(state.simulation)
+    broken[1].view(float)[speeds] = 1e12
+    action[2, 3] = np.nan
+    after = worlds.step(state._replace(simulation=jnp.asarray(broken)), action)
+    assert np.asarray(after.terminated).tolist() == [False, True, True]
+    assert not np.any(after.truncated)
+    assert np.asarray(after.reward)[1:].tolist() == [0.0, 0.0]
+    assert worlds.seeds(after).tolist() == [7, 8, 7]
+    equal(after.simulation[0], expected.simulation[0])
+    joints = "panda/joint_positions"
+    equal(after.final_observation[joints][1], state.observation[joints][1])
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(after.observation))
+
+
+def test_success_once_is_of_the_episode_that_ended(worlds):
+    state = worlds.at([7, 8, 7])
+    opened = state.measurement.openings.at[0].set(0.0)
+    state = state._replace(
+        measurement=state.measurement._replace(openings=opened),
+        succeeded=jnp.array([True, False, False]),
+        count=jnp.array([1, 1, 3]),
+    )
+    after = worlds.step(state, wandering(1, 3)[0])
+    assert np.asarray(after.success_once).tolist() == [True, False, False]
+    assert np.asarray(after.succeeded).tolist() == [True, False, False]
+    after = worlds.step(after._replace(count=jnp.array([3, 1, 1])), wandering(1, 3)[0])
+    assert np.asarray(after.success_once).tolist() == [True, False, False]
+    assert not np.any(after.succeeded)
+
+
+def test_rollouts_are_steps_also_from_states_in_between(worlds):
+    actions = wandering(6, 3)
+    state = worlds.at([7, 8, 8])
+    states, rewards = [state], []
+    for action in actions:
+        states.append(worlds.step(states[-1], action))
+        rewards.append(states[-1].reward)
+    last, seen = jax.jit(lambda state: worlds.rollout(actions, state))(state)
+    equal(last.simulation, states[-1].simulation)
+    equal(seen.reward, np.stack(rewards))
+    assert np.asarray(seen.truncated).sum() == 3
+    last, _ = worlds.rollout(actions[2:], states[2])
+    equal(last.simulation, states[-1].simulation)
+
+    def hold(observation, key):
+        home = observation["panda/joint_positions"]
+        return jnp.concatenate([home, observation["panda/gripper_opening"]], axis=-1)
+
+    last, seen = worlds.rollout(hold, state, 3)
+    assert seen.action.shape == (3, 3, 8) and np.asarray(last.count).tolist() == [3, 3, 3]
+
+
+def test_a_saved_state_goes_on_alike_in_other_worlds(worlds, tmp_path):
+    actions, file = wandering(3, 3), tmp_path / "state.npz"
+    state = worlds.step(worlds.at([7, 8, 7]), actions[0])
+    worlds.save(state, file)
+    expected = worlds.step(worlds.step(state, actions[1]), actions[2])
+    other = batch.from_pool(worlds.pool, 3, "c")
+    found = other.step(other.step(other.restore(file), actions[1]), actions[2])
+    equal(found, expected)
+    with pytest.raises(InputError, match="its worlds differ"):
+        batch.from_pool(worlds.pool, 2, "c").restore(file)
+    file.write_bytes(b"nothing")
+    with pytest.raises(InputError, match="no state of worlds"):
+        other.restore(file)
+
+
+def test_reset_takes_every_start_equally_often(worlds):
+    many = batch.from_pool(worlds.pool, 5, "c")
+    seeds = many.seeds(many.reset(jax.random.key(0))).tolist()
+    assert sorted((seeds.count(7), seeds.count(8))) == [2, 3]
+
+
+def test_pools_are_read_back_as_they_were_written(worlds, tmp_path):
+    worlds.pool.save(tmp_path / "pool")
+    again = batch.from_pool(tmp_path / "pool", 3, "c")
+    action = wandering(1, 3)[0]
+    state = worlds.at([7, 8, 7])
+    equal(again.step(again.at([7, 8, 7]), action), worlds.step(state, action))
+    (tmp_path / "pool").write_bytes(b"nothing")
+    with pytest.raises(InputError, match="no pool of starts"):
+        batch.from_pool(tmp_path / "pool", 3)
+
+
+@pytest.mark.full
+def test_processes_change_nothing(worlds):
+    split = batch.from_pool(worlds.pool, 3, "c", processes=2)
+    action = wandering(1, 3)[0]
+    state = worlds.at([7, 8, 7])
+    equal(split.step(split.at([7, 8, 7]), action), worlds.step(state, action))
+    split.close()
+
+
+def test_what_cannot_be_is_refused_in_one_line(worlds):
+    for arguments, message in (
+        ({"worlds": 0}, "worlds is 0"),
+        ({"engine": "wrap"}, "unknown engine 'wrap'"),
+        ({"obs_mode": "state+rgb"}, "observation mode of batched worlds"),
+        ({"control_mode": "primitive"}, "unknown control mode"),
+        ({"seeds": ()}, "no seeds"),
+        ({"processes": 0}, "processes is 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            make(TASK, **arguments)
+    with pytest.raises(InputError, match="2 seeds for 3 worlds"):
+        worlds.at([7, 8])
+    with pytest.raises(InputError, match="seed 9 is not in the pool of 2 starts"):
+        worlds.at([7, 8, 9])
+    with pytest.raises(InputError, match="needs the number of steps"):
+        worlds.rollout(lambda observation, key: None, worlds.at([7, 8, 7]))
+
+
+def test_without_a_gpu_one_line_says_what_is_missing():
+    if jax.default_backend() == "gpu":
+        pytest.skip("there is one")
+    with pytest.raises(InputError, match=r"engine 'warp' cannot run here: .*pip install") as caught:
+        batch.from_pool(Path("nowhere"), 3, "warp")
+    assert "\n" not in str(caught.value)
