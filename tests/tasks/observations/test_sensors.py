@@ -117,14 +117,14 @@ def test_the_goal_marker_is_neither_seen_nor_touched():
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_the_objects_points_lie_on_the_object(environment, seed):
     task = reset(environment, seed)
     step = environment.step(HOLD)
     obj = _in_sight(task, environment.physics)
     own = task.instance_names.index(obj.mjcf_model.model)
     cloud = step.observation["pointcloud/points"][step.observation["pointcloud/instance"] == own]
-    assert len(cloud) >= 10  # a shelf may hide most of it
+    assert len(cloud) > 20
     _assert_on(obj, environment.physics, cloud)
     normals = step.observation["pointcloud/normals"][step.observation["pointcloud/instance"] == own]
     lengths = np.linalg.norm(normals, axis=1)
