@@ -27,8 +27,11 @@ from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.instructions.sentence import instruction
 
 
-class _Taped(BaselinePolicy):
-    """The baseline, with what it did."""
+class TapedBaseline(BaselinePolicy):
+    """The baseline, with what it did.
+
+    Attributes: taken: its actions, one a control step.
+    """
 
     def __init__(self) -> None:
         super().__init__("oracle")
@@ -88,7 +91,7 @@ def attempt(config: EnvConfig, seed: int, number: int, folder: Path, *, failures
     Raises:
       InputError: The configuration cannot be.
     """
-    environment, policy = environment_of(config), _Taped()
+    environment, policy = environment_of(config), TapedBaseline()
     tape = StateTape(environment)
     naming = Naming(config.task, number, policy.pose_source)
     result, _ = play(

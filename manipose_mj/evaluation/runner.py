@@ -183,6 +183,7 @@ def _checked_policy(config: EvaluationConfig) -> dict[str, Any]:
             environment_of(config.env_config(task))
     if config.jobs > 1 or config.dask is not None:
         load_policy.cache_clear()  # workers make their own
+        getattr(policy, "close", lambda: None)()
     return metadata_of(policy)
 
 
@@ -341,7 +342,7 @@ def _crashed(
         episode=episode,
         seed=config.episode_seed(task, episode),
         object="",
-        pose_source=config.pose if config.policy is None else "none",
+        pose_source=_pose_source(config),
         success_once=False,
         success_at_end=False,
         failure="policy" if of_policy else "physics",
@@ -358,8 +359,7 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
-    if config.policy is not None:
-        settings["pose"] = "oracle" if config.policy.sees_true_poses else "none"
+    settings["pose"] = _pose_source(config)
     settings["poses"] = config.poses
     return {
         "tasks": summarize(results),
@@ -368,6 +368,13 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
         "command": config.command,
         **settings,
     }
+
+
+def _pose_source(config: EvaluationConfig) -> str:
+    """Where object poses come from, as far as the configuration tells."""
+    if config.policy is None:
+        return config.pose
+    return "oracle" if config.policy.sees_true_poses else "none"
 
 
 def _json(document: dict[str, Any]) -> bytes:

@@ -4,7 +4,7 @@ All three send a dictionary of metadata first and answer packed observations wit
 
 - Plain openpi servers know nothing of episodes: nothing is sent at a reset.
 - RoboArena's announce what they need (`needs_session_id` and others). Every message then has an `endpoint`, `infer` or
-  `reset`, and a reset is answered by text.
+  `reset`, and a reset is answered by text. They count DROID's exterior cameras from 0, and may want a session's number.
 - Ours announce `manipose_reset`. Messages have an `endpoint` too; that of a reset holds task, instruction, seed
   and action space, and is answered by an empty dictionary.
 """
@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any, Literal
 
+import numpy as np
 from websockets.exceptions import ConnectionClosed, InvalidURI, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
@@ -25,6 +26,7 @@ from manipose_mj.wire.framing import pack, unpack
 
 RESET = "manipose_reset"
 Dialect = Literal["openpi", "roboarena", "manipose"]
+_EXTERIOR = "exterior_image_1", "exterior_image_0"
 _OPEN_S = 10.0
 # The first inference of a server may compile for minutes.
 _ANSWER_S = 900.0
@@ -44,6 +46,7 @@ class RemotePolicy:
         self._connection: ClientConnection | None = None
         self._stack = ExitStack()
         self._reached = False
+        self._session = np.zeros(1, np.int32)
 
     @property
     def dialect(self) -> Dialect:
@@ -95,6 +98,7 @@ class RemotePolicy:
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
         """Tell the server of an episode, if it wants to know."""
         self.open()
+        self._session = np.array([seed % 2**31], np.int32)
         if self.dialect == "openpi":
             return
         message = {
@@ -123,6 +127,10 @@ class RemotePolicy:
           PolicyLostError: The connection broke.
         """
         message = dict(obs)
+        if self.dialect == "roboarena":
+            message = {name.replace(*_EXTERIOR): value for name, value in obs.items()}
+            if self.metadata["needs_session_id"]:
+                message["session_id"] = self._session
         if self.dialect != "openpi":
             message["endpoint"] = "infer"
         answer = self._asked(message)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from threading import Lock
 from typing import Any
@@ -23,14 +23,11 @@ logger = logging.getLogger(__name__)
 
 
 class PolicyServer:
-    """Listens from the start; answers one request at a time, for as many clients as come.
-
-    Clients share the policy: one that remembers its episode serves one evaluating process at a time.
-    """
+    """Listens from the start; answers one request at a time, for as many clients as come."""
 
     def __init__(
         self,
-        policy: Policy,
+        policy: Policy | Callable[[], Policy],
         host: str = "localhost",
         port: int = 0,
         metadata: Mapping[str, Any] | None = None,
@@ -38,7 +35,8 @@ class PolicyServer:
         """Binds the port.
 
         Args:
-          policy: To serve.
+          policy: To serve all clients. A policy that remembers its episode can play one at a time: for several
+            processes that evaluate give a class or function that makes one, called for each client.
           host: Interface to listen at.
           port: 0: a free one.
           metadata: To send first, such as the name of a model.
@@ -46,7 +44,8 @@ class PolicyServer:
         Raises:
           OSError: The port is taken.
         """
-        self._policy = policy
+        shared = None if isinstance(policy, type) or not isinstance(policy, Policy) else policy
+        self._make: Any = policy if shared is None else lambda: shared
         self._metadata = {**(metadata or {}), RESET: True}
         self._one_at_a_time = Lock()
         self._server = open_server(
@@ -70,11 +69,12 @@ class PolicyServer:
 
     def _converse(self, connection: ServerConnection) -> None:
         connection.send(pack(self._metadata))
+        policy: Policy = self._make()
         try:
             for message in connection:
                 try:
                     with self._one_at_a_time:
-                        answer = self._answered(unpack(message))  # type: ignore[arg-type]
+                        answer = _answered(policy, unpack(message))  # type: ignore[arg-type]
                 except Exception:
                     logger.exception("the policy raised")
                     connection.send(traceback.format_exc())
@@ -84,28 +84,29 @@ class PolicyServer:
         except ConnectionClosed:
             return
 
-    def _answered(self, message: dict[str, Any]) -> Any:
-        endpoint = message.pop("endpoint", "infer")
-        if endpoint == "infer":
-            return dict(self._policy.infer(message))
-        if endpoint != "reset":
-            raise ValueError(f"unknown endpoint {endpoint!r}; expected 'infer' or 'reset'")
-        space = message["action_space"]
-        self._policy.reset(
-            task=message["task"],
-            instruction=message["instruction"],
-            seed=message["seed"],
-            action_space=ActionSpace(
-                np.asarray(space["low"], float),
-                np.asarray(space["high"], float),
-                space["control_mode"],
-                space["hz"],
-            ),
-        )
-        return {}
+
+def _answered(policy: Policy, message: dict[str, Any]) -> dict[str, Any]:
+    endpoint = message.pop("endpoint", "infer")
+    if endpoint == "infer":
+        return dict(policy.infer(message))
+    if endpoint != "reset":
+        raise ValueError(f"unknown endpoint {endpoint!r}; expected 'infer' or 'reset'")
+    space = message["action_space"]
+    policy.reset(
+        task=message["task"],
+        instruction=message["instruction"],
+        seed=message["seed"],
+        action_space=ActionSpace(
+            np.asarray(space["low"], float),
+            np.asarray(space["high"], float),
+            space["control_mode"],
+            space["hz"],
+        ),
+    )
+    return {}
 
 
-def serve(policy: Policy, host: str = "localhost", port: int = 8000) -> None:
+def serve(policy: Policy | Callable[[], Policy], host: str = "localhost", port: int = 8000) -> None:
     """Serve a policy until the process ends; arguments as of `PolicyServer`."""
     server = PolicyServer(policy, host, port)
     logger.info("serving at %s", server.address)

@@ -98,6 +98,7 @@ def test_a_replay_adds_observations_and_converts(demos, tmp_path):
         replay(new, replace(asked, out=tmp_path / "again"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("hz", [50.0, 10.0])
 def test_recorded_targets_succeed_as_a_policy(demos, hz, tmp_path):
     settings = PolicySettings(
@@ -141,6 +142,7 @@ class _Writer:
         self.finalized = True
 
 
+@pytest.mark.full
 def test_an_export_replays_at_its_rate_and_writes_frames(demos, tmp_path):
     opened = []
 

@@ -27,6 +27,7 @@ from manipose_mj.policies.loading import load_policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from tests.few_objects import config, few
 from tests.places import ROOT
+from tests.policies.own_policies import Reaching
 from tests.policies.test_remote import served
 
 TASK = "single_object/target_pose"
@@ -119,6 +120,7 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     assert "own_policies.py" in note.read_text()
 
 
+@pytest.mark.full
 def test_the_baseline_is_a_policy_behind_the_same_door():
     settings = PolicySettings(
         "manipose_mj.policies.baseline:BaselinePolicy", hz=50.0, stop="horizon"
@@ -148,7 +150,9 @@ def test_in_process_and_over_a_websocket_results_are_equal(tmp_path):
 def test_results_do_not_depend_on_the_number_of_jobs(tmp_path):
     evaluate(evaluation(tmp_path / "one", REACHING))
     evaluate(evaluation(tmp_path / "two", REACHING, jobs=2))
-    assert timeless(tmp_path / "one") == timeless(tmp_path / "two")
+    with served(Reaching) as server:
+        evaluate(evaluation(tmp_path / "away", replace(REACHING, name=server.address), jobs=2))
+    assert timeless(tmp_path / "one") == timeless(tmp_path / "two") == timeless(tmp_path / "away")
 
 
 @contextmanager

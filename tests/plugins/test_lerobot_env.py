@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from manipose_mj.demos.attempts import TapedBaseline
+from manipose_mj.demos.playback import slowed
+from manipose_mj.demos.replay import SteppedPolicy
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.episode import Naming, environment_of, play
+from manipose_mj.evaluation.rollout import Rules
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from tests.few_objects import few
 from tests.places import ROOT
 
@@ -88,3 +94,28 @@ def test_a_protocols_episodes_are_shared_out_and_only_new_rollouts_count(environ
 def test_bad_input_is_one_line(environment_class, options, said):
     with pytest.raises(InputError, match=said):
         environment_class(TASK, objects=few(TASK), **options)
+
+
+@pytest.mark.full
+def test_its_success_is_that_of_our_evaluation(environment_class):
+    """The same targets, at 10 Hz, in the first frozen episodes of both."""
+    frozen = list(protocol.load("v1").task(TASK).episodes.values())[:3]
+    plain = EnvConfig(TASK, obs_mode="state", split="test")
+    ours, theirs = [], []
+    there = environment_class(TASK, protocol="v1", obs_mode="state+pose")
+    for number, episode in enumerate(frozen):
+        spec = EpisodeSpec(**episode.asked)
+        tape, here = TapedBaseline(), environment_of(plain)
+        play(here, tape, spec, Rules(), Naming(TASK, number, "oracle"))
+        targets = slowed(np.array(tape.taken), 10.0)
+        rules = Rules(10.0, stop="success")
+        result, _ = play(here, SteppedPolicy(targets), spec, rules, Naming(TASK, number, "none"))
+        ours.append(result.success_at_end)
+        there.reset(seed=number, options=NEW)
+        ended, step = False, 0
+        while not ended:
+            target = targets[min(step, len(targets) - 1)]
+            *_, terminated, truncated, info = there.step(target)
+            ended, step = terminated or truncated, step + 1
+        theirs.append(info["is_success"])
+    assert ours == theirs and any(ours)

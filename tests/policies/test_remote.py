@@ -165,19 +165,20 @@ def test_roboarena_servers_get_an_endpoint_and_answer_a_reset_by_text():
     heard = []
 
     def roboarena(connection: Any) -> None:
-        connection.send(
-            msgpack.packb({"needs_session_id": False, "action_space": "joint_position"})
-        )
+        connection.send(msgpack.packb({"needs_session_id": True, "n_external_cameras": 1}))
         for message in connection:
-            heard.append(unpack(message)["endpoint"])
-            actions = pack(np.zeros((1, 8)))
-            connection.send("reset successful" if heard[-1] == "reset" else actions)
+            heard.append(unpack(message))
+            reset = heard[-1]["endpoint"] == "reset"
+            connection.send("reset successful" if reset else pack(np.zeros((1, 8))))
 
     with stranger(roboarena) as address:
         remote = RemotePolicy(address)
         remote.reset(**EPISODE)
-        assert remote.dialect == "roboarena" and remote.infer(OBSERVATION).shape == (1, 8)
-    assert heard == ["reset", "infer"]
+        seen = {"observation/exterior_image_1_left": np.zeros((2, 2, 3), np.uint8)}
+        assert remote.dialect == "roboarena" and remote.infer(seen).shape == (1, 8)
+    assert [message["endpoint"] for message in heard] == ["reset", "infer"]
+    assert heard[1]["session_id"].tolist() == [EPISODE["seed"]]
+    assert heard[1]["observation/exterior_image_0_left"].shape == (2, 2, 3)
 
 
 @pytest.mark.parametrize("first", [b"\xc1", msgpack.packb([1]), "hello"])

@@ -94,7 +94,10 @@ def attitude_words(asset: Asset, rotation: Float[np.ndarray, "3 3"]) -> str:
     label, x, y = asset.label, rotation[:, 0], rotation[:, 1]
     if label.object_type == "functional":
         return f"its tip pointing {direction_words(x)}"
-    if len(label.symmetry.rotations) > 3 and not label.symmetry.axial:  # a box
+    if (
+        len(label.symmetry.rotations) > 3 and not label.symmetry.axial
+    ):  # a box, whose sides have two ends
+        x, y = (axis if axis[2] > -_UPRIGHT else -axis for axis in (x, y))
         return f"its longest side pointing {direction_words(x)}, its second {direction_words(y)}"
     if abs(x[2]) < _UPRIGHT:
         return f"lying, its top pointing {direction_words(x)}"

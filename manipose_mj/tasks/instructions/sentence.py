@@ -84,7 +84,7 @@ def _object(task: ManipulationTask, name: str) -> str:
         return f"the {words}"
     placed = task.start.objects[name]
     pose = placed.pose @ task.objects[name].asset.label.pose
-    return f"the {words} at {level_words(pose[:2, 3])}"
+    return f"the {words} ({level_words(pose[:2, 3])})"
 
 
 def _part(task: ManipulationTask, name: str) -> str:
