@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ class PoseLabel:
       extents: `(3,)` [m], lengths of the bounding box along X, Y, Z.
       symmetry: Proper rotations, in the label frame, that leave the shape unchanged.
       print_symmetry: Those of them that leave the print unchanged as well, where it breaks some.
+      center: `(3,)` [m], the middle of the bounding box in the label frame: beside the origin for tools.
     """
 
     origin: Float[np.ndarray, "3"]
@@ -33,6 +34,7 @@ class PoseLabel:
     extents: Float[np.ndarray, "3"]
     symmetry: SymmetryGroup
     print_symmetry: SymmetryGroup | None = None
+    center: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def symmetry_textured(self) -> SymmetryGroup:

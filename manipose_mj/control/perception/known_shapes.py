@@ -70,7 +70,12 @@ class KnownShape:
         symmetry = _kept(self.label.symmetry, np.asarray(extents, float))
         return KnownShape(
             name=self.name,
-            label=replace(self.label, extents=np.asarray(extents, float), symmetry=symmetry),
+            label=replace(
+                self.label,
+                extents=np.asarray(extents, float),
+                symmetry=symmetry,
+                center=self.label.center * scale,
+            ),
             hulls=hulls,
             surface=self.surface * scale,
             rests=rests,

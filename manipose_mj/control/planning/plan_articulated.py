@@ -208,7 +208,9 @@ def poses_in_cavity(
         floor = np.array([0.0, 0.0, height + DROP_HEIGHT - cavity.extents[2] / 2])
         other_side = float(rotation[2] @ down) < _SAME_SIDE
         hands = _hands(obj, rotation, open_side)
-        turned = rotation @ obj.label.rotation.T @ obj.label.origin
+        # From the middle of its box to the label's origin, and on to the object's.
+        to_label = -(rotation @ obj.label.center) * [1, 1, 0]
+        to_object = to_label - rotation @ obj.label.rotation.T @ obj.label.origin
         places = []
         for sideways in _SIDEWAYS:
             for share in shares:
@@ -216,12 +218,12 @@ def poses_in_cavity(
                 if _meets(place_, reach, taken):
                     continue
                 # Without grasps that are known to come from there, any place is as good.
-                room = count_clear(hands, floor + place_ - turned, cavity, open_side, taken)
+                room = count_clear(hands, floor + place_ + to_object, cavity, open_side, taken)
                 places.append((-min(room, _ENOUGH_HANDS), abs(sideways), -share, place_))
         # Stable: of places with as much room those come first that come first above.
         places.sort(key=lambda entry: entry[0])
         for room, off, back, place_ in places[:_MAX_PER_WAY]:
-            pose = carrier @ compose(rotation, cavity.center + floor + place_)
+            pose = carrier @ compose(rotation, cavity.center + floor + place_ + to_label)
             found.append((other_side, room, round(reach[2], 4), off, back, pose))
     found.sort(key=lambda entry: entry[:5])
     return tuple(entry[5] for entry in found)
@@ -248,7 +250,8 @@ def _boxes_inside(
         if other.name != obj.name and lies_inside(other, part):
             pose = invert(carrier) @ other.label_pose
             reach = other.label.reach(pose[:3, :3])
-            boxes.append(Placement((pose[:3, 3] - part.cavity.center)[:2], reach))
+            middle = pose[:3, :3] @ other.label.center + pose[:3, 3]
+            boxes.append(Placement((middle - part.cavity.center)[:2], reach))
     return boxes
 
 

@@ -122,7 +122,8 @@ def resting(asset: Asset, stable: int, yaw: float) -> Resting:
     rest = asset.stable_poses[stable]
     rotation = rotation_about(_UP, yaw) @ rest.rotation
     reach = asset.label.reach(rotation @ asset.label.rotation)
-    return Resting(rotation, (rotation @ asset.label.origin)[:2], reach, rest.height)
+    middle = asset.label.origin + asset.label.rotation @ asset.label.center
+    return Resting(rotation, (rotation @ middle)[:2], reach, rest.height)
 
 
 def ways_to_lie(asset: Asset, cavity: Cavity) -> tuple[tuple[int, float], ...]:
