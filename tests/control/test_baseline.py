@@ -64,7 +64,8 @@ def test_an_episode_repeats_bit_for_bit_whatever_ran_before(episodes, task):
     first, trajectory = episodes[task, seed]
     again, same = _run(task, seed)  # other seeds and the other task have run in between
     own, other = asdict(first), asdict(again)
-    assert own.pop("wall_s") > 0 and other.pop("wall_s") > 0
+    for name in ("wall_s", "policy_s"):
+        assert own.pop(name) > 0 and other.pop(name) > 0
     assert own == other
     np.testing.assert_array_equal(trajectory.times, same.times)
     for one, two in zip(vars(trajectory).values(), vars(same).values(), strict=True):
@@ -176,8 +177,9 @@ def test_a_diverging_simulation_is_recorded_and_harms_no_later_episode(monkeypat
         result = _fail(patched, diverge)
     assert result.failure == "physics"
     again, _ = _run(TARGET_POSE, 1)
-    expected = {**asdict(episodes[TARGET_POSE, 1][0]), "wall_s": 0.0}
-    assert {**asdict(again), "wall_s": 0.0} == expected
+    times = {"wall_s": 0.0, "policy_s": 0.0}
+    expected = {**asdict(episodes[TARGET_POSE, 1][0]), **times}
+    assert {**asdict(again), **times} == expected
 
 
 def test_an_unknown_stage_cannot_be_raised():
