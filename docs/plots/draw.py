@@ -77,19 +77,40 @@ def legend(axes: Axes, **options: object) -> None:
     axes.legend(frameon=False, labelcolor=INK, **options)  # pyright: ignore[reportArgumentType]
 
 
+# What tasks of protocol v1 are alike in, by how their names begin.
+FAMILIES = {
+    "single object": ("single_object/",),
+    "open a drawer": (
+        "articulated/open_bottom_drawer",
+        "articulated/open_middle_drawer",
+        "articulated/open_top_drawer",
+    ),
+    "open a door": (
+        "articulated/open_cabinet_door",
+        "articulated/open_microwave",
+        "articulated/open_oven",
+    ),
+    "close": ("articulated/close_",),
+    "store": ("articulated/store_",),
+    "take out": ("articulated/take_out_",),
+    "clutter": ("clutter/",),
+}
+
+
 def protocol_v1() -> Figure:
-    """Success of the baseline on every task, with Wilson's interval."""
-    table = sorted(rows("protocol_v1"), key=lambda r: r["task"], reverse=True)
-    figure = new_figure(7.2, 7.6)
+    """Success of the baseline by family of tasks, with Wilson's interval."""
+    table = rows("protocol_v1")
+    figure = new_figure(7.2, 3.4)
     axes = axes_of(figure, grid="x")
-    for y, row in enumerate(table):
-        won, of = int(row["successes"]), int(row["episodes"])
+    for y, starts in enumerate(reversed(FAMILIES.values())):
+        own = [row for row in table if row["task"].startswith(starts)]
+        won, of = (sum(int(row[name]) for row in own) for name in ("successes", "episodes"))
         low, high = wilson_interval(won, of)
         axes.barh(y, 100 * won / of, color=TEAL, height=0.62)
         axes.plot([100 * low, 100 * high], [y, y], color=INK, linewidth=1.4)
-    axes.set_yticks(range(len(table)), [row["task"] for row in table], fontsize=8.5)
+    axes.set_yticks(range(len(FAMILIES)), list(reversed(FAMILIES)))
     axes.set_xlim(0, 100)
-    axes.set_ylim(-0.7, len(table) - 0.3)
+    axes.set_ylim(-0.7, len(FAMILIES) - 0.3)
     axes.set_xlabel("success at end [%], line: Wilson 95 % interval")
     return figure
 
