@@ -39,7 +39,7 @@ _FIELDS = (
 )
 # MuJoCo Warp places geoms that cannot move once, not in every world anew.
 _STATIC = ("geom_xpos", "geom_xmat")
-# Contacts and constraint rows that may come to those of a start: a hand in the midst of things.
+# Contacts and constraint rows that may come to those of a start: a hand that touches several objects.
 _MORE_CONTACTS, _MORE_ROWS = 24, 192
 
 
@@ -104,7 +104,7 @@ class RowFields:
         self._sizes = np.array(sizes)
 
     def capacity(self, worlds: int) -> Capacity:
-        """Room for twice what the starts need, and a hand in the midst of things."""
+        """Room for twice what the starts need, and a hand that touches several objects."""
         contacts = 2 * float(self._sizes[:, 0].mean()) + _MORE_CONTACTS
         rows = 2 * int(self._sizes[:, 1].max()) + _MORE_ROWS
         return Capacity(int(contacts * worlds), rows)
@@ -128,7 +128,7 @@ class RowFields:
             setattr(model, name, own)
             pairs.append((table, own))
         pairs += [(table, getattr(data, name)) for name, table in self.static.items()]
-        return [_flattened(table, own, worlds) for table, own in pairs]
+        return [_as_numbers(table, own, worlds) for table, own in pairs]
 
 
 def _fields_of(
@@ -159,7 +159,7 @@ def _awake(model: mujoco.MjModel) -> mujoco.MjModel:
     return copied
 
 
-def _flattened(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:
+def _as_numbers(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:
     """A table on the device and the array that it is copied to, both as plain numbers, the latter as a view."""
     import warp as wp  # pyright: ignore[reportMissingImports]
 
