@@ -98,7 +98,7 @@ class WarpEngine:
     ) -> tuple[Physics, Bool[Array, " worlds"], Measurement]:
         found = self._call(rows, targets, *(physics[name] for name in _MOVING))
         names: tuple[str, ...] = (*_MOVING, *_READ, "contacts", "diverged", "overflow")
-        after = dict(zip(names, found, strict=True))
+        after = {name: array for name, array in zip(names, found, strict=True)}
         kept = {name: after[name] for name in _MOVING}
         kept["overflow"] = physics["overflow"] | after["overflow"]
         return kept, after["diverged"] > 0, self._measured(rows, after)
