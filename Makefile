@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constr
 # Workers take tests from one another when they run out of their own.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 
-.PHONY: demo test test-full test-all lint bench conformance docs release-check clean
+.PHONY: demo test test-full test-all lint bench conformance conformance-lerobot docs release-check clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/manipose demo --out demo_report
@@ -36,6 +36,14 @@ bench: $(VENV)/.dev
 conformance: $(VENV)/.conformance
 	$(BIN)/python -m pytest tests/conformance tests/gym
 	$(BIN)/python benchmarks/random_steps.py
+
+# Stock LeRobot in an environment of its own: 5 GB, Python 3.12. Records, exports, trains for a moment, evaluates.
+LEROBOT_PYTHON ?= python3.12
+LEROBOT_VENV ?= .venv-lerobot
+conformance-lerobot:
+	$(LEROBOT_PYTHON) -m venv $(LEROBOT_VENV)
+	$(LEROBOT_VENV)/bin/python -m pip --disable-pip-version-check install --quiet "lerobot[dataset,training,evaluation]>=0.6.1,<0.7" . ./plugins/lerobot_env_manipose
+	plugins/lerobot_env_manipose/conformance.sh $(LEROBOT_VENV)/bin conformance_lerobot
 
 # The site, into site/: index.html opens without a server. The variable keeps Material's notice about MkDocs 2 out.
 docs: $(VENV)/.docs
@@ -66,4 +74,4 @@ $(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@
 
 clean:
-	rm -rf $(VENV) demo_report site
+	rm -rf $(VENV) $(LEROBOT_VENV) conformance_lerobot demo_report site

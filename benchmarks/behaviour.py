@@ -60,7 +60,7 @@ def played(task: str, episode: int, pose: str) -> dict[str, Any]:
     spec = EpisodeSpec(1000 + episode)
     result, trajectory = run_episode(config, spec, episode=episode, pose=pose)
     row = asdict(result)
-    del row["wall_s"]
+    del row["wall_s"], row["policy_s"]
     row["trajectory"] = digest(trajectory.qpos)
     row["annotations"] = trajectory.annotations[-1]
     return row

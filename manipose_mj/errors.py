@@ -33,3 +33,10 @@ class WorkerDiedError(RuntimeError):
 
     Nobody's input is wrong: the command line prints the message and exits with code 1.
     """
+
+
+class ServerLostError(WorkerDiedError):
+    """The server of somebody's method went away, or failed, in the middle of work.
+
+    Nothing that was asked of it counts as its failure: the command line prints the message and exits with code 1.
+    """

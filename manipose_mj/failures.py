@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics")
+STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics", "policy")
 
 
 class StageFailure(Exception):
-    """The baseline gave up.
+    """A policy gave up, or what it answered is no action.
 
     Attributes: stage: one of `STAGES`; reason: one line.
     """

@@ -19,16 +19,19 @@ PACKAGES = ("manipose_mj", "asset_pipeline")
 # Each line may import the lines below it, and itself; imports inside functions and for types count too.
 ORDER = (
     ("manipose_mj.cli",),
-    ("manipose_mj.gym", "manipose_mj.evaluation"),
+    ("manipose_mj.demos",),
+    ("manipose_mj.evaluation", "manipose_mj.bop"),
+    ("manipose_mj.gym", "manipose_mj.policies"),
     ("manipose_mj.batch",),
     ("manipose_mj.suite",),
     ("manipose_mj.control",),
+    ("manipose_mj.estimators",),
     ("manipose_mj.tasks", "manipose_mj.ppf_jax"),
     ("manipose_mj.actions",),
     ("manipose_mj.mjcf",),
     ("manipose_mj.grasp_sampling",),
     ("manipose_mj.assets",),
-    ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console"),
+    ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
     ("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
 )
 # What scans and generators are made into is the package's; robots and tasks are none of the pipeline's business.

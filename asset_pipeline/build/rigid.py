@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,7 @@ def finish_rigid(
     Raises:
       InputError: The object has no volume or no pose in which it rests.
     """
+    label = replace(label, center=box_center(body, label))
     body, poses = steadied(body, label)
     with scratch_model(body) as model_path:
         grasps = with_trials(sample_grasps(body, poses), poses, model_path)
@@ -67,3 +69,15 @@ def finish_rigid(
         label_quality=label_quality,
     )
     return write_asset(asset, (body,))
+
+
+def box_center(body: Body, label: PoseLabel) -> Float[np.ndarray, "3"]:
+    """The middle of the bounding box along the label's axes, in the label frame [m].
+
+    Args:
+      body: What collides.
+      label: In the same frame.
+    """
+    points = np.concatenate([shape.surface().vertices for shape in body.collision])
+    along = (points - label.origin) @ label.rotation
+    return (along.min(axis=0) + along.max(axis=0)) / 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ class PoseLabel:
       extents: `(3,)` [m], lengths of the bounding box along X, Y, Z.
       symmetry: Proper rotations, in the label frame, that leave the shape unchanged.
       print_symmetry: Those of them that leave the print unchanged as well, where it breaks some.
+      center: `(3,)` [m], the middle of the bounding box in the label frame: beside the origin for tools.
     """
 
     origin: Float[np.ndarray, "3"]
@@ -33,6 +34,7 @@ class PoseLabel:
     extents: Float[np.ndarray, "3"]
     symmetry: SymmetryGroup
     print_symmetry: SymmetryGroup | None = None
+    center: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def symmetry_textured(self) -> SymmetryGroup:
@@ -43,6 +45,20 @@ class PoseLabel:
     def pose(self) -> Float[np.ndarray, "4 4"]:
         """`T_mesh_label`."""
         return compose(self.rotation, self.origin)
+
+    def reach(self, rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+        """Half the lengths that the object takes up along the axes of a frame [m].
+
+        Those of its bounding box; of its cylinder, where its X is an axis of revolution.
+
+        Args:
+          rotation: `R_frame_label`.
+        """
+        half = self.extents / 2
+        if not self.symmetry.axial:
+            return np.abs(rotation) @ half
+        along = np.abs(rotation[:, 0])
+        return along * half[0] + np.sqrt(np.clip(1 - along**2, 0, 1)) * half[1:].max()
 
 
 def symmetry_to_bop(label: PoseLabel, group: SymmetryGroup) -> dict[str, Any]:

@@ -28,6 +28,7 @@ def label_to_json(label: PoseLabel) -> dict[str, Any]:
         "origin": rounded(label.origin),
         "rotation": rounded(label.rotation),
         "extents": rounded(label.extents),
+        "center": rounded(label.center),
         **symmetry_to_bop(label, label.symmetry),
         **{
             f"{name}_{TEXTURED}": entries
@@ -58,6 +59,7 @@ def read_label(fields: Fields) -> PoseLabel:
         extents=fields.lengths("extents"),
         symmetry=symmetry,
         print_symmetry=None if same else printed,
+        center=fields.array("center", 3) if "center" in fields.values else np.zeros(3),
     )
 
 

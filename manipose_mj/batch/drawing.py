@@ -252,6 +252,7 @@ def _slot_shapes(
             chosen,
             frames=np.concatenate([np.tile(np.eye(4), (len(objects), 1, 1)), chosen.frames]),
             extents=np.zeros((len(objects), 3)),
+            centers=np.zeros((len(objects), 3)),
             symmetries=(SymmetryGroup.identity(),) * len(objects),
         )
     padded = tuple(group.padded(MAX_TURNS) for group in chosen.symmetries)

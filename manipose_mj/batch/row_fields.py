@@ -128,7 +128,7 @@ class RowFields:
             setattr(model, name, own)
             pairs.append((table, own))
         pairs += [(table, getattr(data, name)) for name, table in self.static.items()]
-        return [_as_numbers(table, own, worlds) for table, own in pairs]
+        return [_in_one_column(table, own, worlds) for table, own in pairs]
 
 
 def _fields_of(
@@ -159,7 +159,7 @@ def _awake(model: mujoco.MjModel) -> mujoco.MjModel:
     return copied
 
 
-def _as_numbers(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:
+def _in_one_column(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:
     """A table on the device and the array that it is copied to, both as plain numbers, the latter as a view."""
     import warp as wp  # pyright: ignore[reportMissingImports]
 

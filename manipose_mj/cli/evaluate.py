@@ -1,4 +1,4 @@
-"""`manipose evaluate`: episodes of the baseline, their statistics and the report."""
+"""`manipose evaluate`: episodes of the baseline or of a policy, their statistics and the report."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from tyro.conf import Positional, arg
 from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
+
+BASELINE = "baseline"
 
 
 def evaluate(
@@ -25,9 +27,30 @@ def evaluate(
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
+    resample: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
     dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None,
+    policy: Annotated[
+        str, arg(metavar="baseline|MODULE:FACTORY|ws://HOST:PORT", help_behavior_hint="")
+    ] = BASELINE,
+    policy_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
+    obs_mode: Annotated[str | None, arg(metavar="MODES", help_behavior_hint="")] = None,
+    control_mode: Annotated[str | None, arg(metavar="MODE", help_behavior_hint="")] = None,
+    hz: Annotated[float | None, arg(metavar="HZ", help_behavior_hint="")] = None,
+    execute: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    obs_format: Annotated[Literal["manipose", "droid"] | None, arg(help_behavior_hint="")] = None,
+    stop: Annotated[Literal["success", "horizon"] | None, arg(help_behavior_hint="")] = None,
+    planner: Literal["rules", "llm", "replay"] = "rules",
+    model: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None,
+    base_url: Annotated[str | None, arg(metavar="URL", help_behavior_hint="")] = None,
+    replay: Annotated[Path | None, arg(metavar="FILE|DIR", help_behavior_hint="")] = None,
+    instruction: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint="")] = None,
+    estimator: Annotated[
+        str | None, arg(metavar="MODULE:FACTORY|ws://HOST:PORT", help_behavior_hint="")
+    ] = None,
+    estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
+    give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
 ) -> int:
-    """Run the baseline, and write results.jsonl, summary.json and report.html.
+    """Run a policy, and write results.jsonl, summary.json and report.html.
 
     Args:
       tasks: Tasks to run, as `manipose list` names them.
@@ -40,12 +63,37 @@ def evaluate(
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
+      resample: Play a protocol's episodes with other seeds, drawn from this one; their objects of question stay.
       dask: Run on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786, instead of --jobs; its
         workers have to see --out and the folders of --objects.
+      policy: Whose episodes: the baseline's; those of what a factory of a Python module makes; or those of a
+        server that speaks openpi's websocket protocol. The options below are for the latter two.
+      policy_args: Keyword arguments of the factory, as a JSON object.
+      obs_mode: What the policy sees, joined by +: state, pose, rgb, depth, segmentation, pointcloud, or keys of them;
+        by default state, and state+rgb in DROID's format.
+      control_mode: What its actions mean; by default pd_joint_pos.
+      hz: Its actions per second of simulated time, by default 10, at most 50; targets are held in between.
+      execute: How many actions of each answer are carried out; by default all.
+      obs_format: Names of its observations: manipose by default, or DROID's.
+      stop: When an episode ends: once the goal has held for 0.5 s, as by default, or at the time limit.
+      planner: Makes the baseline's plans: rules, a language model, or the recorded answers of one.
+      model: Name of the language model.
+      base_url: Of its OpenAI-compatible endpoint, such as http://localhost:8000/v1; the key comes from
+        OPENAI_API_KEY.
+      replay: Exchanges that an evaluation by a language model has left in DIR/exchanges.
+      instruction: What the language model shall do instead of what the episode asks for.
+      estimator: Whose estimates --pose estimated means: those of what a factory of a Python module makes, or of a
+        server; by default those of the package's weights.
+      estimator_args: Keyword arguments of its factory, as a JSON object.
+      give_cad: Give it the mesh of the very object that is seen; the results say so.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
+    from manipose_mj.estimators.loading import load_estimator
+    from manipose_mj.estimators.settings import chosen_estimator
     from manipose_mj.evaluation.config import EvaluationConfig
+    from manipose_mj.evaluation.planner_settings import PlannerSettings
+    from manipose_mj.evaluation.policy_settings import PolicySettings
     from manipose_mj.evaluation.protocol.frozen import EPISODES
 
     if out is None:
@@ -54,10 +102,40 @@ def evaluate(
         out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
     if episodes is None:
         episodes = EPISODES if protocol else 50
+    options = {
+        "arguments": policy_args,
+        "obs_mode": obs_mode,
+        "control_mode": control_mode,
+        "hz": hz,
+        "execute": execute,
+        "obs_format": obs_format,
+        "stop": stop,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    if policy == BASELINE and given:
+        names = ", ".join(name.replace("_", " ") for name in given)
+        raise InputError(f"{names}: for a policy only; name one by --policy, or leave them out")
+    settings = None if policy == BASELINE else PolicySettings(policy, **given)
+    record = out / "exchanges" if planner == "llm" else None
+    planning = PlannerSettings(planner, model, base_url, replay, instruction, record)
     config = EvaluationConfig(
-        tasks, out, episodes, seed, pose, jobs, objects or None, protocol=protocol, dask=dask
+        tasks,
+        out,
+        episodes,
+        seed,
+        pose,
+        jobs,
+        objects or None,
+        protocol=protocol,
+        dask=dask,
+        policy=settings,
+        resample=resample,
+        planner=planning,
+        estimator=chosen_estimator(estimator, estimator_args, give_cad),
     )
     named = check_names(tasks, objects)
+    if config.estimator is not None:
+        load_estimator(config.estimator)  # before minutes are spent on building objects
     if protocol is not None:
         named = names_in_protocol(protocol, tasks, episodes)
     with cluster(dask):

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import demo, doctor, evaluate, render, tasks, view
+from manipose_mj.cli import card, demo, demos, doctor, evaluate, render, tasks, view
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
+from manipose_mj.cli.protocol import build_app as build_protocol_app
 from manipose_mj.console.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
@@ -25,11 +26,20 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(demo.demo)
     app.command(evaluate.evaluate)
+    app.command(card.card)
     app.command(name="list")(tasks.list_tasks)
     app.command(render.render)
     app.command(view.view)
     app.command(build_assets_app(), name="assets", help="Build, check and inspect object assets.")
-    app.command(build_pose_app(), name="pose", help="Train and evaluate pose estimators.")
+    app.command(
+        demos.build_app(), name="demos", help="Record demonstrations, replay and export them."
+    )
+    app.command(build_pose_app(), name="pose", help="Train, evaluate and score pose estimators.")
+    app.command(
+        build_protocol_app(),
+        name="protocol",
+        help="Certify that a protocol's starts can be solved.",
+    )
     app.command(doctor.doctor)
     return app
 

@@ -113,7 +113,7 @@ def summary_table(summary: dict[str, dict[str, Any]]) -> Table:
     table = Table()
     # Names fold rather than vanish in a narrow window.
     table.add_column("task", overflow="fold", min_width=24)
-    for name in ("at end", "95 %", "once", "wall s"):
+    for name in ("at end", "95 %", "once", "policy s", "wall s"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("failures", overflow="fold", min_width=10)
     for task, row in summary.items():
@@ -123,6 +123,7 @@ def summary_table(summary: dict[str, dict[str, Any]]) -> Table:
             f"{row['success_at_end']}/{row['episodes']}",
             f"{100 * low:.0f}-{100 * high:.0f} %",
             str(row["success_once"]),
+            f"{row['median_policy_s']:.1f}",
             f"{row['median_wall_s']:.1f}",
             ", ".join(f"{stage} {n}" for stage, n in row["failures"].items()) or "none",
         )

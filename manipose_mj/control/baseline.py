@@ -17,13 +17,16 @@ from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.pose_sources import make_perception
+from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
-from manipose_mj.control.planning.planner import candidate_plans
-from manipose_mj.control.planning.rearrangement import in_clutter, is_supported
+from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
+from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.instructions.sentence import instruction
 
 # Plans an episode may try, and stages whose failure another plan may mend.
 MAX_PLANS = 5
@@ -63,17 +66,26 @@ class _Scene:
 class Baseline:
     """Plans and acts in one environment; build it once, run it for many episodes."""
 
-    def __init__(self, environment: composer.Environment, pose: str = "oracle") -> None:
+    def __init__(
+        self,
+        environment: composer.Environment,
+        pose: str = "oracle",
+        planner: TaskPlanner | None = None,
+        estimator: EstimatorSettings | None = None,
+    ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
         Args:
           environment: Of one of this package's tasks, after its first reset.
           pose: Where object poses come from, one of `POSE_SOURCES`.
+          planner: Makes the plans; by default by rules.
+          estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
 
         Raises:
-          InputError: There is no such source.
+          InputError: There is no such source or estimator.
         """
-        self._environment, self._pose = environment, pose
+        self._environment, self._pose, self._estimator = environment, pose, estimator
+        self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
 
@@ -97,14 +109,15 @@ class Baseline:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
         arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        perception = make_perception(self._pose, task, physics)
+        perception = make_perception(self._pose, task, physics, self._estimator)
         return _Scene(physics.model.ptr, arm, perception)
 
-    def actions(self, seed: int) -> Iterator[Action]:
+    def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:
         """The actions of one episode, from the start state to the goal.
 
         Args:
           seed: Of the motion planner's samples.
+          plans: How many it may try; clutter has a number of its own, for each move there is a plan.
 
         Raises:
           StageFailure: The baseline gives up; the stage says where.
@@ -112,6 +125,7 @@ class Baseline:
         self.status = ""
         scene, task = self._scene(), self._environment.task
         scene.perception.reset(seed)
+        self._planner.begin(instruction(task))
         timestep = task.control_timestep
         executor = Executor(scene.perception, timestep)
         primitives = Primitives(executor)
@@ -123,12 +137,13 @@ class Baseline:
                 if candidates is None:
                     estimate = executor.observe()
                     planner = MotionPlanner(estimate.scene, scene.arm, timestep, rng, allowance)
-                    step_by_step = in_clutter(task.goals, estimate)
-                    candidates = candidate_plans(task.goals, estimate, planner)
+                    step_by_step = self._planner.step_by_step(task.goals, estimate)
+                    candidates = self._planner.candidates(task.goals, estimate, planner)
                     candidate = _after(candidates, progress.failures_here)
                 else:
                     candidate = next(candidates)
                 plan = candidate.steps()
+                check_plan(plan, estimate)
             except InputError as error:
                 raise StageFailure("plan", str(error)) from None
             # It stands until another plan is chosen.
@@ -144,7 +159,7 @@ class Baseline:
                 candidates = None
             except StageFailure as failure:
                 failures += 1
-                most = MAX_FAILED_MOVES if step_by_step else MAX_PLANS
+                most = MAX_FAILED_MOVES if step_by_step else plans
                 # In clutter the same plan may be carried out another way.
                 counts = acted or not step_by_step
                 same = progress.failed_again(plan, executor.observe(), counts=counts)

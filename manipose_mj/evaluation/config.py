@@ -12,7 +12,10 @@ import numpy as np
 
 from manipose_mj.assets.categories import Split
 from manipose_mj.errors import InputError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.planner_settings import PlannerSettings
+from manipose_mj.evaluation.policy_settings import PolicySettings
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -35,6 +38,10 @@ class EvaluationConfig:
         training objects.
       dask: Address of a dask scheduler whose workers run the episodes instead of `jobs` processes of this
         machine; they have to see `out` and the folders of `objects`. Results do not depend on it.
+      policy: Whose episodes they are; None: the baseline's.
+      resample: Base seed for other seeds of the protocol's episodes, whose objects, furniture and parts stay.
+      planner: Makes the baseline's plans.
+      estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
     """
 
     tasks: tuple[str, ...]
@@ -46,6 +53,10 @@ class EvaluationConfig:
     objects: tuple[str, ...] | None = None
     protocol: str | None = None
     dask: str | None = None
+    policy: PolicySettings | None = None
+    resample: int | None = None
+    planner: PlannerSettings = PlannerSettings()
+    estimator: EstimatorSettings | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -55,6 +66,16 @@ class EvaluationConfig:
         for name, least in (("episodes", 1), ("seed", 0), ("jobs", 1)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; expected at least {least}")
+        if self.policy is not None and self.pose != "oracle":
+            raise InputError(f"pose {self.pose!r} is of the baseline; leave it out with a policy")
+        if self.policy is not None and self.planner.kind != "rules":
+            raise InputError(
+                f"planner {self.planner.kind!r} is of the baseline; leave it out with a policy"
+            )
+        if self.resample is not None and (self.protocol is None or self.resample < 0):
+            raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
+        if self.estimator is not None and self.pose != "estimated":
+            raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
 
@@ -68,8 +89,13 @@ class EvaluationConfig:
 
     @property
     def poses(self) -> dict[str, str]:
-        """What of a scene the baseline knows truly and what by estimates, for reports."""
+        """What of a scene the policy knows truly, by estimates or not at all, for reports."""
+        if self.policy is not None:
+            source = "true" if self.policy.sees_true_poses else "none"
+            return {"objects": source, "furniture": source}
         objects = "estimated" if self.pose == "estimated" else "true"
+        if self.estimator is not None:
+            objects = self.estimator.source
         return {"objects": objects, "furniture": "true"}
 
     @property
@@ -81,8 +107,18 @@ class EvaluationConfig:
         """The environment that the episodes of a task take place in."""
         # Loads the simulator: workers only.
         from manipose_mj.control.perception.pose_sources import sensors_for
+        from manipose_mj.gym.features import feature_sensors
         from manipose_mj.tasks.core.config import EnvConfig
 
+        if self.policy is not None:
+            return EnvConfig(
+                task,
+                obs_mode=self.policy.obs_mode,
+                control_mode=self.policy.control_mode,
+                objects=self.objects,
+                split=self.split,
+                sensors=feature_sensors(self.policy.obs_mode),
+            )
         return EnvConfig(
             task,
             obs_mode="state",
@@ -93,6 +129,8 @@ class EvaluationConfig:
 
     def episode_seed(self, task: str, episode: int) -> int:
         """The seed of one episode."""
+        if self.resample is not None:
+            return episode_seed(self.resample, f"{self.protocol}/{task}", episode)
         if self.protocol is not None:
             return protocol.load(self.protocol).episode(task, episode).seed
         return episode_seed(self.seed, task, episode)
@@ -103,7 +141,8 @@ class EvaluationConfig:
         from manipose_mj.tasks.core.config import EpisodeSpec
 
         if self.protocol is not None:
-            return EpisodeSpec(**protocol.load(self.protocol).episode(task, episode).asked)
+            asked = protocol.load(self.protocol).episode(task, episode).asked
+            return EpisodeSpec(**{**asked, "seed": self.episode_seed(task, episode)})
         return EpisodeSpec(self.episode_seed(task, episode))
 
     @property
@@ -117,6 +156,10 @@ class EvaluationConfig:
             "objects": None if self.objects is None else list(self.objects),
             "protocol": self.protocol,
             "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,
+            "resample": self.resample,
+            "policy": self.policy and self.policy.identity,
+            "planner": self.planner.identity,
+            "estimator": self.estimator and self.estimator.identity,
         }
 
     @property
@@ -124,7 +167,13 @@ class EvaluationConfig:
         """The command line that repeats this evaluation."""
         words = ["manipose", "evaluate", *self.tasks]
         chosen = ["--protocol", self.protocol] if self.protocol else ["--seed", str(self.seed)]
-        words += ["--episodes", str(self.episodes), *chosen, "--pose", self.pose]
+        if self.resample is not None:
+            chosen += ["--resample", str(self.resample)]
+        whose = ["--pose", self.pose, *self.planner.words]
+        whose += self.estimator.words if self.estimator is not None else []
+        if self.policy is not None:
+            whose = self.policy.words
+        words += ["--episodes", str(self.episodes), *chosen, *whose]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:
             words += ["--objects", *self.objects]

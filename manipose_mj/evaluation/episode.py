@@ -3,99 +3,265 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import mujoco
 import numpy as np
 from dm_control import composer
 
 from manipose_mj import suite
-from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.perception.pose_sources import check_pose_source
+from manipose_mj.control.baseline import MAX_PLANS
+from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
+from manipose_mj.evaluation.planner_settings import PlannerSettings
+from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
+from manipose_mj.evaluation.rollout import Outcome, Rollout, Rules
 from manipose_mj.failures import StageFailure
+from manipose_mj.gym.droid import droid_observation, from_droid
+from manipose_mj.gym.features import Features
+from manipose_mj.policies.baseline import BaselinePolicy
+from manipose_mj.policies.loading import load_policy
+from manipose_mj.policies.protocol import ActionSpace, Policy, PolicyRaisedError
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
 
 _RECORD_EVERY = 5  # control steps
+BY_RULES = PlannerSettings()
 
 
 def run_episode(
-    config: EnvConfig, spec: EpisodeSpec, *, episode: int = 0, pose: str = "oracle"
+    config: EnvConfig,
+    spec: EpisodeSpec,
+    *,
+    episode: int = 0,
+    pose: str = "oracle",
+    planner_seed: int | None = None,
+    plans: int = MAX_PLANS,
+    planner: PlannerSettings = BY_RULES,
+    estimator: EstimatorSettings | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
     Args:
       config: Of the environment, which is compiled once per process and configuration; objects by name or
         by folder.
-      spec: Of the episode; its seed is the motion planner's too.
+      spec: Of the episode.
       episode: Index, copied into the result.
       pose: Where object poses come from: `"oracle"` or `"estimated"`.
+      planner_seed: Of the motion planner; by default the episode's.
+      plans: How many the baseline may try.
+      planner: What makes them.
+      estimator: Whose estimates they are; None: those of the package's weights.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
+      ServerLostError: The estimator's server went away.
     """
-    check_pose_source(pose)
+    environment, policy = environment_of(config), _baseline(config, pose, plans, planner, estimator)
+    naming = Naming(config.task, episode, pose)
+    return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
+
+
+def run_policy_episode(
+    config: EnvConfig,
+    spec: EpisodeSpec,
+    *,
+    episode: int = 0,
+    pose: str = "",
+    settings: PolicySettings,
+) -> tuple[EpisodeResult, Trajectory]:
+    """Run anybody's policy for one episode; arguments as of `run_episode`, but poses are the policy's affair.
+
+    Args:
+      config: Of the environment.
+      spec: Of the episode.
+      episode: Index, copied into the result.
+      pose: Ignored.
+      settings: The policy, what it sees, and how it acts.
+
+    Raises:
+      InputError: Something named does not exist, or the policy's actions are those of another control mode.
+      ServerLostError: The policy's server went away.
+      PolicyRaisedError: The policy's code failed.
+    """
+    policy = _Guarded(load_policy(settings.name, settings.arguments))
+    attached = policy.privileged
+    source = getattr(policy.policy, "pose_source", "oracle") if attached else "none"
+    if settings.sees_true_poses:
+        source = "oracle"
+    rules = Rules(settings.hz, settings.execute, settings.stop)
+    naming = Naming(config.task, episode, source)
+    return play(environment_of(config), policy, spec, rules, naming, settings)
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What an episode's result copies. Attributes: task; episode: its index; pose_source: where poses came from."""
+
+    task: str
+    episode: int
+    pose_source: str
+
+
+def play(
+    environment: TaskEnvironment,
+    policy: Policy,
+    spec: EpisodeSpec,
+    rules: Rules,
+    naming: Naming,
+    settings: PolicySettings | None = None,
+    after_step: Callable[[int], None] = lambda steps: None,
+    policy_seed: int | None = None,
+) -> tuple[EpisodeResult, Trajectory]:
+    """Reset an environment and let a policy act in it.
+
+    Args:
+      environment: Of the task.
+      policy: To play.
+      spec: Of the episode.
+      rules: Rates and when to stop.
+      naming: For the result.
+      settings: What the policy sees; None: nothing, as for the baseline.
+      after_step: Called with the number of control steps, first with 0 after the reset.
+      policy_seed: That the policy gets; by default the episode's.
+    """
     started = time.perf_counter()
     seed = spec.seed or 0
-    environment, baseline = _environment(config, pose)
-    environment.reset(replace(spec, seed=seed))
+    first = environment.reset(replace(spec, seed=seed))
     task = environment.task
-    estimates = EstimateErrors(task, environment.physics, baseline)
-    baseline.status = ""  # the generator below resets it too late for the first record
-    recorder = _Recorder(environment, baseline)
+    attach: Callable[[composer.Environment], None] | None = getattr(policy, "attach", None)
+    if attach is not None:
+        attach(environment)
+    inner = policy.policy if isinstance(policy, _Guarded) else policy
+    estimates = None
+    if isinstance(inner, BaselinePolicy):
+        estimates = EstimateErrors(task, environment.physics, inner.baseline)
+    recorder = _Recorder(environment, inner)
     recorder.record()
-    failure: StageFailure | None = None
-    steps = 0
+    after_step(0)
+
+    def both(steps: int) -> None:
+        recorder.after_step(steps)
+        after_step(steps)
+
+    limits = environment.action_spec()
+    features = None if settings is None else Features(environment)
+    space = ActionSpace(limits.minimum, limits.maximum, task.control_mode.name, rules.hz)
+    outcome = Outcome()
     try:
-        for action in baseline.actions(seed):
-            estimates.after_planning()
-            last = environment.step(action).last()
-            steps += 1
-            recorder.after_step(steps)
-            if last:
-                failure = StageFailure("timeout", f"not done after {task.config.horizon:.0f} s")
-                if environment.failure:
-                    failure = StageFailure("physics", environment.failure_reason)
-                break
-    except StageFailure as gave_up:
-        estimates.after_planning()
-        failure = gave_up
-    physics = environment.physics
+        policy.reset(
+            task=naming.task,
+            instruction="" if features is None else features.instruction,
+            seed=seed if policy_seed is None else policy_seed,
+            action_space=space,
+        )
+    except StageFailure as failure:
+        outcome.failure = failure
+    else:
+        droid = settings is not None and settings.obs_format == "droid"
+        rollout = Rollout(
+            environment,
+            policy,
+            rules,
+            observe=_observer(features, droid),
+            translate=from_droid if droid else np.asarray,
+            after_decision=estimates.after_planning if estimates else lambda: None,
+            after_step=both,
+        )
+        outcome = rollout.run(first)
+    recorder.record()
+    wall_s = time.perf_counter() - started
+    return _result(environment, outcome, naming, seed, estimates, wall_s), recorder.trajectory()
+
+
+def _observer(features: Features | None, droid: bool) -> Callable[[Any], dict[str, Any]]:
+    """What makes a policy's observation; of none, where nothing is to be seen."""
+    if features is None:
+        return lambda observation: {}
+    if droid:
+        return lambda observation: droid_observation(features.read(observation))
+    return features.read
+
+
+def _result(
+    environment: TaskEnvironment,
+    outcome: Outcome,
+    naming: Naming,
+    seed: int,
+    estimates: EstimateErrors | None,
+    wall_s: float,
+) -> EpisodeResult:
+    task, physics, failure = environment.task, environment.physics, outcome.failure
     success = task.succeeded(physics) and (failure is None or failure.stage != "physics")
     if failure is None and not success:
         failure = StageFailure("release", "the goal is not met though the plan was carried out")
-    if failure is not None and not success:
+    if failure is not None and not success and estimates is not None:
         failure = estimates.cause(failure)
-    recorder.record()
     error = task.goal_error(physics)
-    result = EpisodeResult(
-        task=config.task,
-        episode=episode,
+    return EpisodeResult(
+        task=naming.task,
+        episode=naming.episode,
         seed=seed,
         object=task.object_name,
-        pose_source=pose,
+        pose_source=naming.pose_source,
         success_once=task.success_once,
         success_at_end=success,
         failure=None if success or failure is None else failure.stage,
         reason="" if success or failure is None else failure.reason,
         translation_error=None if error is None else error[0],
         rotation_error=None if error is None else error[1],
-        steps=steps,
-        sim_time=round(steps * task.control_timestep, 6),
+        steps=outcome.steps,
+        sim_time=round(outcome.steps * task.control_timestep, 6),
         max_penetration=task.max_penetration,
-        wall_s=time.perf_counter() - started,
-        estimate_translation_error=estimates.translation,
-        estimate_rotation_error=estimates.rotation,
+        wall_s=wall_s,
+        estimate_translation_error=estimates.translation if estimates else None,
+        estimate_rotation_error=estimates.rotation if estimates else None,
+        decisions=outcome.decisions,
+        clipped_actions=outcome.clipped,
+        policy_s=outcome.policy_s,
     )
-    return result, recorder.trajectory()
+
+
+class _Guarded:
+    """A stranger's policy, whose mistakes are told from those of the simulation.
+
+    Attributes:
+      policy: It.
+      privileged: Whether it asks for its environment: it then may read what only a simulator knows.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+        self.privileged = callable(getattr(policy, "attach", None))
+
+    def attach(self, environment: composer.Environment) -> None:
+        if self.privileged:
+            self._called("attach", environment)
+
+    def reset(self, **episode: Any) -> None:
+        self._called("reset", **episode)
+
+    def infer(self, obs: Any) -> Any:
+        return self._called("infer", obs)
+
+    def _called(self, method: str, *arguments: Any, **named: Any) -> Any:
+        try:
+            return getattr(self.policy, method)(*arguments, **named)
+        except (InputError, ServerLostError, StageFailure, MemoryError):
+            raise
+        except Exception as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise PolicyRaisedError(f"the policy's {method} raised {reason}") from error
 
 
 def start_state(config: EnvConfig, spec: EpisodeSpec) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """The model and the state in which an episode starts; arguments as for an episode."""
-    environment, _ = _environment(config, "oracle")
+    environment = environment_of(config)
     environment.reset(spec)
     return environment.physics.model.ptr, environment.physics.data.ptr
 
@@ -106,9 +272,9 @@ def scene_model(config: EnvConfig, spec: EpisodeSpec) -> mujoco.MjModel:
 
 
 class _Recorder:
-    def __init__(self, environment: composer.Environment, baseline: Baseline) -> None:
+    def __init__(self, environment: composer.Environment, policy: Policy) -> None:
         self._data = environment.physics.data
-        self._baseline = baseline
+        self._policy = policy
         self._times: list[float] = []
         self._positions: list[np.ndarray] = []
         self._annotations: list[str] = []
@@ -120,15 +286,34 @@ class _Recorder:
     def record(self) -> None:
         self._times.append(float(self._data.time))
         self._positions.append(np.array(self._data.qpos, np.float32))
-        self._annotations.append(self._baseline.status)
+        self._annotations.append(str(getattr(self._policy, "status", "")))
 
     def trajectory(self) -> Trajectory:
         return Trajectory(np.array(self._times), np.stack(self._positions), self._annotations)
 
 
 @lru_cache(maxsize=4)
-def _environment(config: EnvConfig, pose: str) -> tuple[TaskEnvironment, Baseline]:
-    """Made once per process and configuration."""
+def environment_of(config: EnvConfig) -> TaskEnvironment:
+    """The environment of a configuration, made once per process.
+
+    Raises:
+      InputError: The configuration cannot be.
+    """
     environment = suite.make(config, 0)
     environment.reset()
-    return environment, Baseline(environment, pose)
+    assert isinstance(environment, TaskEnvironment)
+    return environment
+
+
+@lru_cache(maxsize=4)
+def _baseline(
+    config: EnvConfig,
+    pose: str,
+    plans: int,
+    planner: PlannerSettings,
+    estimator: EstimatorSettings | None,
+) -> BaselinePolicy:
+    """The baseline of the configuration's environment."""
+    policy = BaselinePolicy(pose, planner.make(), plans, estimator)
+    policy.attach(environment_of(config))
+    return policy

@@ -24,14 +24,15 @@ from manipose_mj.failures import STAGES
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How one episode ended; every field but `wall_s` repeats bit for bit from the seed.
+    """How one episode ended; every field but `wall_s` and `policy_s` repeats bit for bit from the seed.
 
     Attributes:
       task: `"domain/task"`.
       episode: Index within the evaluation, from 0.
       seed: The episode's own seed.
       object: Name of the manipulated asset.
-      pose_source: Where the baseline took object poses from, such as `"oracle"`.
+      pose_source: Where the policy took object poses from: `"oracle"` from the simulator, `"estimated"`, or
+        `"none"` where it got none.
       success_once: The goal was met at some control step.
       success_at_end: The goal was met when the episode ended.
       failure: A member of `STAGES`, or None on success at the end.
@@ -45,6 +46,9 @@ class EpisodeResult:
       estimate_translation_error: Largest error of an estimate that an object was grasped with [m];
         None for true poses, and where nothing was grasped.
       estimate_rotation_error: The same for the rotation, the least over the symmetry [rad].
+      decisions: Times the policy was asked.
+      clipped_actions: Actions with a number beyond its limit.
+      policy_s: Wall-clock time in the policy, of `wall_s` [s].
     """
 
     task: str
@@ -64,6 +68,9 @@ class EpisodeResult:
     wall_s: float
     estimate_translation_error: float | None = None
     estimate_rotation_error: float | None = None
+    decisions: int = 0
+    clipped_actions: int = 0
+    policy_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.failure is not None and self.failure not in STAGES:
@@ -93,7 +100,13 @@ class Trajectory:
 
 
 # Fields that older records lack.
-_SINCE = {"estimate_translation_error": None, "estimate_rotation_error": None}
+_SINCE = {
+    "estimate_translation_error": None,
+    "estimate_rotation_error": None,
+    "decisions": 0,
+    "clipped_actions": 0,
+    "policy_s": 0.0,
+}
 
 
 def to_line(result: EpisodeResult) -> str:

@@ -9,14 +9,18 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
-from manipose_mj.errors import InputError, WorkerDiedError
+from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
+from manipose_mj.estimators.loading import load_estimator
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.planner_settings import PlannerSettings
+from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     Trajectory,
@@ -28,6 +32,8 @@ from manipose_mj.evaluation.records import (
     write_trajectory,
 )
 from manipose_mj.evaluation.statistics import machine, summarize, versions
+from manipose_mj.policies.loading import load_policy, metadata_of
+from manipose_mj.policies.protocol import PolicyRaisedError
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -50,18 +56,54 @@ class Runner(Protocol):
     ) -> tuple[EpisodeResult, Trajectory]: ...
 
 
-def simulate(
-    config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
-) -> tuple[EpisodeResult, Trajectory]:
-    """The runner of every real evaluation: the baseline policy in MuJoCo."""
-    from manipose_mj.evaluation.episode import run_episode  # loads the simulator: workers only
+@dataclass(frozen=True)
+class BaselineRunner:
+    """The runner of every real evaluation of the baseline, in MuJoCo."""
 
+    planner: PlannerSettings
+    estimator: EstimatorSettings | None = None
+
+    def __call__(
+        self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
+    ) -> tuple[EpisodeResult, Trajectory]:
+        """One episode."""
+        from manipose_mj.evaluation.episode import run_episode  # loads the simulator: workers only
+
+        with _quiet_simulator():
+            return run_episode(
+                config,
+                spec,
+                episode=episode,
+                pose=pose,
+                planner=self.planner,
+                estimator=self.estimator,
+            )
+
+
+@dataclass(frozen=True)
+class PolicyRunner:
+    """The runner of every real evaluation of somebody's policy."""
+
+    settings: PolicySettings
+
+    def __call__(
+        self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
+    ) -> tuple[EpisodeResult, Trajectory]:
+        """One episode."""
+        from manipose_mj.evaluation.episode import run_policy_episode  # as above
+
+        with _quiet_simulator():
+            return run_policy_episode(config, spec, episode=episode, settings=self.settings)
+
+
+@contextmanager
+def _quiet_simulator() -> Iterator[None]:
     # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
     simulator_log = logging.getLogger("absl")
     level = simulator_log.level
     simulator_log.setLevel(logging.ERROR)
     try:
-        return run_episode(config, spec, episode=episode, pose=pose)
+        yield
     finally:
         simulator_log.setLevel(level)
 
@@ -73,7 +115,7 @@ def evaluate(
     config: EvaluationConfig,
     *,
     resume: bool = False,
-    runner: Runner = simulate,
+    runner: Runner | None = None,
     on_progress: Callable[[Sequence[EpisodeResult], int], None] = _ignore,
 ) -> list[EpisodeResult]:
     """Run every episode that the output folder lacks, and write results and summary there.
@@ -84,7 +126,7 @@ def evaluate(
     Args:
       config: What to run.
       resume: Keep the results that `config.out` holds and run only what is missing.
-      runner: Runs one episode.
+      runner: Runs one episode; None: in MuJoCo.
       on_progress: Called with the results so far and the number wanted, first before any runs.
 
     Returns:
@@ -93,14 +135,26 @@ def evaluate(
     Raises:
       InputError: The folder cannot be written or holds results of something else, an episode's
         input is wrong, or there is no such cluster.
-      WorkerDiedError: A worker process was killed; what had ended is kept.
+      WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
+    metadata = _checked_policy(config)
+    _check_estimator(config)
+    if runner is None and config.policy is not None:
+        runner = PolicyRunner(config.policy)
+    elif runner is None:
+        runner = BaselineRunner(config.planner, config.estimator)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), _results_file(config.out) as file:
         results = _kept_results(config, identity, file, resume)
         if not results:
-            run = {**identity, "jobs": config.jobs, "command": config.command, "machine": machine()}
+            run = {
+                **identity,
+                "policy metadata": metadata,
+                "jobs": config.jobs,
+                "command": config.command,
+                "machine": machine(),
+            }
             write_atomically(config.out / RUN_FILE, _json(run))
         done = {r.key for r in results}
         missing = [
@@ -118,6 +172,37 @@ def evaluate(
         write_sorted(config.out / RESULTS_FILE, results)
         write_atomically(config.out / SUMMARY_FILE, _json(_summary(config, results)))
     return sorted(results, key=lambda r: r.key)
+
+
+def _checked_policy(config: EvaluationConfig) -> dict[str, Any]:
+    """What the policy says of itself, if it says something; nothing is written before it can be had.
+
+    Raises:
+      InputError: It cannot, or its observations are none of a task's.
+    """
+    if config.policy is None:
+        return {}
+    for task in config.tasks:
+        config.env_config(task)  # misspelt modes
+    policy = load_policy(config.policy.name, config.policy.arguments)
+    if "/" in config.policy.obs_mode:  # a key, which some tasks may lack
+        from manipose_mj.evaluation.episode import environment_of
+
+        for task in config.tasks:
+            environment_of(config.env_config(task))
+    if config.jobs > 1 or config.dask is not None:
+        load_policy.cache_clear()  # workers make their own
+        getattr(policy, "close", lambda: None)()
+    return metadata_of(policy)
+
+
+def _check_estimator(config: EvaluationConfig) -> None:
+    """Make the estimator, so that what is not there is told before anything is written."""
+    if config.estimator is not None:
+        service = load_estimator(config.estimator)
+        if config.jobs > 1 or config.dask is not None:
+            service.close()  # workers make their own
+            load_estimator.cache_clear()
 
 
 @contextmanager
@@ -237,7 +322,6 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     Raises:
       InputError: The episode's input is wrong, or its trajectory cannot be written.
     """
-    seed = config.episode_seed(task, episode)
     path = trajectory_path(config.out, task, episode)
     start = time.perf_counter()
     try:
@@ -247,29 +331,30 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
-    except (InputError, OSError, MemoryError):
+    except (InputError, OSError, MemoryError, ServerLostError):
         raise
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)
         write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))
-        return _crashed(config, task, episode, seed, error, time.perf_counter() - start)
+        return _crashed(config, task, episode, error, time.perf_counter() - start)
     write_trajectory(path, trajectory)
     return result
 
 
 def _crashed(
-    config: EvaluationConfig, task: str, episode: int, seed: int, error: Exception, wall_s: float
+    config: EvaluationConfig, task: str, episode: int, error: Exception, wall_s: float
 ) -> EpisodeResult:
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    of_policy = isinstance(error, PolicyRaisedError)
+    reason = " ".join((str(error) if of_policy else f"{type(error).__name__}: {error}").split())
     return EpisodeResult(
         task=task,
         episode=episode,
-        seed=seed,
+        seed=config.episode_seed(task, episode),
         object="",
-        pose_source=config.pose,
+        pose_source=_pose_source(config),
         success_once=False,
         success_at_end=False,
-        failure="physics",
+        failure="policy" if of_policy else "physics",
         reason=reason[:300],
         translation_error=None,
         rotation_error=None,
@@ -283,6 +368,7 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
+    settings["pose"] = _pose_source(config)
     settings["poses"] = config.poses
     return {
         "tasks": summarize(results),
@@ -291,6 +377,13 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
         "command": config.command,
         **settings,
     }
+
+
+def _pose_source(config: EvaluationConfig) -> str:
+    """Where object poses come from, as far as the configuration tells."""
+    if config.policy is None:
+        return config.pose
+    return "oracle" if config.policy.sees_true_poses else "none"
 
 
 def _json(document: dict[str, Any]) -> bytes:

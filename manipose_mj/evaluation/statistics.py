@@ -53,6 +53,12 @@ def summarize_task(results: Sequence[EpisodeResult]) -> dict[str, Any]:
         "wilson_95_once": list(wilson_interval(once, len(results))),
         "failures": {stage: stages[stage] for stage in STAGES if stages[stage]},
         "median_wall_s": median(r.wall_s for r in results),
+        "median_policy_s": median(r.policy_s for r in results),
+        "median_simulator_s": median(r.wall_s - r.policy_s for r in results),
+        "policy_s_per_decision": _share(
+            sum(r.policy_s for r in results), sum(r.decisions for r in results)
+        ),
+        "clipped_actions": sum(r.clipped_actions for r in results),
         "median_translation_error_m": _median(r.translation_error for r in results),
         "median_rotation_error_rad": _median(r.rotation_error for r in results),
         "median_estimate_translation_error_m": _median(
@@ -95,6 +101,10 @@ def machine() -> str:
                 break
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return f"{model}, {cores} cores"
+
+
+def _share(total: float, count: int) -> float | None:
+    return total / count if count else None
 
 
 def _median(values: Iterable[float | None]) -> float | None:

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
 from dm_env import TimeStep
 from gymnasium.error import ResetNeeded
+from gymnasium.wrappers.utils import rescale_box
 
 from manipose_mj import suite
+from manipose_mj.actions import checked_action
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
 from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, EpisodeSpec
+from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.registry import TaskSpec, named_task
 from manipose_mj.tasks.goals import Goal, success
+from manipose_mj.tasks.instructions.sentence import instruction
 from manipose_mj.tasks.scene.state import SceneState
 
 Observation = dict[str, np.ndarray]
 _SEEDS = 2**32
-RESET_OPTIONS = ("object", "furniture", "part")
+RESET_OPTIONS = ("object", "furniture", "part", "goal", "start_index")
+_ignored: set[str] = set()  # reset options that were warned of
 
 
 class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
     """A task of this package, or one registered with `manipose_mj.register_task`.
 
     Observations are a flat dictionary. An episode is truncated at the task's horizon and terminated only
-    when the simulation diverges: success ends nothing, for an object may still roll away.
+    when the simulation diverges: success ends nothing, for an object may still roll away, unless asked for.
 
-    `info` holds `success` (all goals are met now), `success_once` (they were, at some step of this
+    `info` holds `success` and `is_success` (all goals are met now), `success_once` (they were, at some step of this
     episode), `failure` (`"physics"` after a divergence, else empty) and, for tasks with goal poses,
     `goal_error`: the largest translation [m] and rotation [rad] that is left, `(2,)`.
 
@@ -46,6 +52,8 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         camera: str = "overview",
         height: int = 480,
         width: int = 640,
+        terminate_on_success: bool = False,
+        normalise_actions: bool = False,
         **config: Unpack[EnvOptions],
     ) -> None:
         """Compiles the task.
@@ -56,6 +64,8 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           camera: That `render` looks through.
           height: Of a rendered picture [pixels].
           width: Of a rendered picture [pixels].
+          terminate_on_success: End an episode in the step in which all goals are met.
+          normalise_actions: Take actions in [-1, 1], by the map of `gymnasium.wrappers.RescaleAction`.
           **config: Fields of `manipose_mj.tasks.EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`,
             `objects`, `split`, `randomisation`, `sensors`.
 
@@ -66,12 +76,21 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
         spec = task if isinstance(task, TaskSpec) else named_task(task)
         # The specification, not its name: a process that loads a pickled environment registers the task.
-        rendering = {"render_mode": render_mode, "camera": camera, "height": height, "width": width}
-        self._arguments: dict[str, Any] = {"task": spec, **rendering, **config}
+        own = {"render_mode": render_mode, "camera": camera, "height": height, "width": width}
+        own |= {
+            "terminate_on_success": terminate_on_success,
+            "normalise_actions": normalise_actions,
+        }
+        self._arguments: dict[str, Any] = {"task": spec, **own, **config}
         self.render_mode = render_mode
         self.environment = suite.make(EnvConfig(spec.full_name, **config))
         self.observation_space = observation_space(self.environment.observation_spec())
         self.action_space = action_box(self.environment.action_spec())
+        self._unscaled: Callable[[np.ndarray], np.ndarray] | None = None
+        if normalise_actions:
+            low, high = np.float32(-1), np.float32(1)
+            self.action_space, _, self._unscaled = rescale_box(self.action_space, low, high)
+        self._terminate_on_success = terminate_on_success
         self._view = View(render_mode, camera, height, width)
         self._running = False
 
@@ -84,21 +103,27 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           seed: Determines this episode and those that follow without a seed, bit for bit; the same as
             `suite.load`'s.
           options: `"object"`, `"furniture"` and `"part"`: names of the rigid object, the piece of furniture and
-            its drawer or door that the episode shall be about.
+            its drawer or door that the episode shall be about; `"goal"`: `T_world_label` that the object shall have
+            in the end, `(4, 4)`; `"start_index"`: which of the fixed starts, the same for everybody, from 0: start i
+            is that of seed i. Others are ignored, with a warning.
+
+        Returns:
+          The observation, and the info with the episode's `instruction`.
 
         Raises:
-          InputError: The seed is no 32-bit number, an option is unknown, or no object has that name.
+          InputError: The seed is no 32-bit number, no object has that name, or the task takes no such goal.
         """
-        for name in options or {}:
-            if name not in RESET_OPTIONS:
-                raise unknown_name("reset option", name, RESET_OPTIONS)
-        if seed is not None and not 0 <= seed < _SEEDS:
-            raise InputError(f"seed is {seed}; expected 0 to {_SEEDS - 1}")
+        spec = _episode(seed, options or {})
         super().reset(seed=seed)
-        step = self.environment.reset(EpisodeSpec(seed, **(options or {})))
+        step = self.environment.reset(spec)
         self._running = True
         self._show()
-        return _copied(step), self._info()
+        return _copied(step), {**self._info(), "instruction": self.instruction}
+
+    @property
+    def instruction(self) -> str:
+        """One sentence that names object, part and goal of this episode."""
+        return instruction(self.environment.task)
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Go on by one control step.
@@ -109,17 +134,18 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         """
         if not self._running:
             raise ResetNeeded("the episode is over, or none was started: call reset first")
+        if self._unscaled is not None:
+            name = self.environment.task.control_mode.name
+            shape = self.environment.action_spec().shape
+            action = self._unscaled(checked_action(name, shape, action))
         step = self.environment.step(action)
         terminated = step.last() and step.discount == 0.0
-        self._running = not step.last()
+        if self._terminate_on_success and self.environment.task.success_now:
+            terminated = True
+        truncated = step.last() and not terminated
+        self._running = not (terminated or truncated)
         self._show()
-        return (
-            _copied(step),
-            float(step.reward),
-            terminated,
-            step.last() and not terminated,
-            self._info(),
-        )
+        return _copied(step), float(step.reward), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The picture, `(height, width, 3)` bytes, in mode `"rgb_array"`; None in the others."""
@@ -163,6 +189,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         task = self.environment.task
         info = {
             "success": bool(task.success_now),
+            "is_success": bool(task.success_now),
             "success_once": bool(task.success_once),
             "failure": self.environment.failure,
         }
@@ -174,6 +201,29 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
     def __reduce__(self) -> tuple[Any, ...]:
         state = self.environment.random_state.get_state()
         return _rebuilt, (self._arguments, self.spec, state)
+
+
+def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
+    """What a reset asks for.
+
+    Raises:
+      InputError: A seed or start index is no 32-bit number, or the goal is no pose.
+    """
+    asked = {name: options[name] for name in RESET_OPTIONS if options.get(name) is not None}
+    for name in options.keys() - RESET_OPTIONS - _ignored:
+        _ignored.add(name)
+        gymnasium.logger.warn(
+            f"reset option {name!r} is unknown and ignored; known: {', '.join(RESET_OPTIONS)}"
+        )
+    index = asked.pop("start_index", None)
+    for what, number in (("seed", seed), ("start_index", index)):
+        if number is not None and not 0 <= number < _SEEDS:
+            raise InputError(f"{what} is {number}; expected 0 to {_SEEDS - 1}")
+    if "goal" in asked:
+        pose = np.asarray(asked["goal"], float)
+        check_pose(pose)
+        asked["goal"] = tuple(map(tuple, pose.tolist()))
+    return EpisodeSpec(seed if index is None else int(index), **asked)
 
 
 def _rebuilt(arguments: dict[str, Any], spec: Any, state: Any) -> ManiPoseEnv:

@@ -9,6 +9,9 @@ from dm_env import specs
 from gymnasium import spaces
 from jaxtyping import Float
 
+# Beyond all numbers of a simulation that has not diverged; learners and checkers want boxes to end somewhere.
+FAR = 1e6
+
 
 def observation_space(observations: Mapping[str, specs.Array]) -> spaces.Dict:
     """A dictionary of boxes, by the observations' flat names such as `panda/joint_positions`."""
@@ -16,12 +19,12 @@ def observation_space(observations: Mapping[str, specs.Array]) -> spaces.Dict:
 
 
 def box(spec: specs.Array) -> spaces.Box:
-    """A box of the array's shape, type and limits; without limits, of the type's."""
+    """A box of the array's shape, type and limits; without limits, of the type's, or of what no scene reaches."""
     dtype = np.dtype(spec.dtype)
     if isinstance(spec, specs.BoundedArray):
-        low, high = spec.minimum, spec.maximum
+        low, high = np.clip(spec.minimum, -FAR, FAR), np.clip(spec.maximum, -FAR, FAR)
     elif np.issubdtype(dtype, np.floating):
-        low, high = -np.inf, np.inf
+        low, high = -FAR, FAR
     elif dtype == np.bool_:
         low, high = False, True
     else:

@@ -11,7 +11,6 @@ from manipose_mj.assets.physics import (
     CONE,
     IMPRATIO,
     INTEGRATOR,
-    NOSLIP_ITERATIONS,
     SCENE_CONTACT_TIME,
     SOLIMP,
     SUPPORT_CONDIM,
@@ -163,7 +162,6 @@ def _set_physics_options(root: mjcf.RootElement) -> None:
         integrator=INTEGRATOR,
         cone=CONE,
         impratio=IMPRATIO,
-        noslip_iterations=NOSLIP_ITERATIONS,
     )
     # What rests is not computed until something that moves touches it; parked objects never are.
     root.option.flag.sleep = "enable"

@@ -13,8 +13,9 @@ from manipose_mj.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, PartEstimate
-    from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator
+    from manipose_mj.ppf_jax.estimator import PoseEstimator
     from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+    from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
     from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 __all__ = [

@@ -21,6 +21,7 @@ from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.outlier_removal import not_alone
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.model import (
     Estimates,
     EstimatingModel,
@@ -34,24 +35,6 @@ BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; o
 MIN_POINTS = 32
 _SAME = (0.02, np.deg2rad(15.0))  # what confidence is about [m, rad]
 _LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
-
-
-@dataclass(frozen=True)
-class PoseEstimate:
-    """Where an object is.
-
-    Attributes:
-      pose: `(4, 4)`, `T_camera_label` [m].
-      extents: `(3,)` [m], lengths of the bounding box along the label's axes.
-      confidence: Probability that the pose is within 15 deg and 2 cm.
-      hypotheses: The other candidates, likeliest first; but those that are within 15 deg and 2 cm of a likelier
-        one come after all others. None has hypotheses of its own.
-    """
-
-    pose: Float[np.ndarray, "4 4"]
-    extents: Float[np.ndarray, "3"]
-    confidence: float
-    hypotheses: tuple[PoseEstimate, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ def sent(start, begin, targets, joints, actions):
     return [*found, *memory]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", SIZES)
 def test_every_robot_of_a_batch_is_sent_what_it_would_be_alone(name):
     law, rng = control_law(name), np.random.default_rng(3)

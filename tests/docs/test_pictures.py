@@ -7,6 +7,7 @@ import importlib.util
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -66,7 +67,12 @@ def test_the_gallery_shows_every_category(gallery):
 def test_a_category_is_drawn_as_in_the_gallery(gallery, tmp_path):
     gallery.draw("bowl", tmp_path)
     for name in ("bowl.webp", "bowl_variants.webp"):
-        assert (tmp_path / name).read_bytes() == (DOCS / "categories" / name).read_bytes()
+        fresh, committed = (
+            np.asarray(Image.open(folder / name).convert("RGB"), int)
+            for folder in (tmp_path, DOCS / "categories")
+        )
+        # Processors round differently, and compression makes half a grey level of it; another category is 30 away.
+        assert np.abs(fresh - committed).mean() < 1.0
 
 
 def test_plots_show_their_tables(plots):

@@ -64,6 +64,7 @@ def test_one_object_is_estimated_as_by_the_whole_model(trained, mug):
     assert found.confidence == pytest.approx(float(whole.confidence[0]), abs=1e-3)
 
 
+@pytest.mark.full
 def test_the_same_key_gives_the_same_answer_ranked(trained, mug):
     estimator = PoseEstimator(trained)
     first, again = (estimator.estimate(mug, key=KEY) for _ in range(2))

@@ -92,6 +92,7 @@ def test_degradation_is_gradual_and_always_an_answer(cups, estimate):
     assert hidden[0] < 8 and hidden[1] < 0.015, hidden
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("wrong_arrays")
 def test_nothing_makes_an_answer_that_is_no_number(cups, estimate):
     rng = np.random.default_rng(0)

@@ -26,7 +26,7 @@ def test_they_load_and_are_small(name):
     assert (FOLDER / f"{name}.npz").stat().st_size < 2e6
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("name", [*MEANS, *MEDIANS])
 def test_they_reproduce_their_published_figures(name):
     clouds = catalogue_clouds(name, "test", view_setting("anywhere"), views=16, jobs=1)

@@ -92,6 +92,7 @@ def world(seed: int) -> tuple[SceneState, dict[str, tuple]]:
         angular_speed=speeds[1],
         touched=np.asarray(rng.random() < 0.3),
         held=np.asarray(rng.random() < 0.3),
+        center=rng.uniform(-0.02, 0.02, 3),
     )
     part = PartState(
         range=np.array([low, low + length]),

@@ -17,7 +17,7 @@ from tests.tasks.episode_driver import HOLD, reset, wander
 SENSORS = SensorConfig(height=60, width=80, cloud_size=4096)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_the_same_seed_and_actions_give_the_same_bits(task):
     first, second = (
@@ -32,7 +32,7 @@ def test_the_same_seed_and_actions_give_the_same_bits(task):
     assert np.array_equal(first.physics.data.qvel, second.physics.data.qvel)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 def test_an_episode_does_not_depend_on_the_one_before(blind):
     states = []
     for before in (0, 8):
@@ -46,7 +46,7 @@ def test_an_episode_does_not_depend_on_the_one_before(blind):
     assert np.array_equal(*states)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 def test_other_seeds_give_other_episodes(blind):
     starts = []
     for seed in range(4):
@@ -56,7 +56,7 @@ def test_other_seeds_give_other_episodes(blind):
     assert len({tuple(np.round(start, 6)) for start in starts}) == 4
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("seed", range(8))
 def test_an_episode_starts_at_rest_with_nothing_overlapping(blind, seed):
     task = reset(blind, seed)
@@ -75,7 +75,7 @@ def test_an_episode_starts_at_rest_with_nothing_overlapping(blind, seed):
     assert task.max_penetration < 0.001
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(4)
 @pytest.mark.usefixtures("wrong_arrays")
 @pytest.mark.parametrize(
     "action",
@@ -89,7 +89,7 @@ def test_wrong_actions_are_refused(blind, action):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 def test_actions_beyond_the_limits_are_clipped(blind, request):
     task = reset(blind, 0)
     servos = blind.physics.bind(task.robot.actuators)

@@ -54,7 +54,9 @@ def overridden(
     if label is not found:
         quality = None  # a person's word
     if label is not asset.label:
-        label = replace(label, extents=np.ptp(surface.vertices @ label.rotation, axis=0))
+        along = (surface.vertices - label.origin) @ label.rotation
+        middle = (along.min(axis=0) + along.max(axis=0)) / 2
+        label = replace(label, extents=np.ptp(along, axis=0), center=middle)
     return replace(
         asset,
         category=category,

@@ -1,4 +1,4 @@
-"""`manipose pose evaluate`: how far a trained estimator is off, category by category."""
+"""`manipose pose evaluate`: how far an estimator is off, category by category."""
 
 from __future__ import annotations
 
@@ -26,8 +26,13 @@ def evaluate_pose(
     views: int = 32,
     jobs: int = CORES,
     json: bool = False,
+    estimator: Annotated[
+        str | None, arg(metavar="MODULE:FACTORY|ws://HOST:PORT", help_behavior_hint="")
+    ] = None,
+    estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
+    give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
 ) -> int:
-    """Evaluate a trained pose estimator on rendered views of the catalogue's test objects.
+    """Evaluate a pose estimator on rendered views of the catalogue's test objects.
 
     Errors are the least over each object's symmetry group; in brackets as NOCS counts them, who lets a
     mug turn about its axis while its handle is hidden. Flipped: an error of more than 90 degrees.
@@ -43,6 +48,9 @@ def evaluate_pose(
       views: Of each object.
       jobs: Processes that render.
       json: Print JSON, for other programs.
+      estimator: Evaluate this one of yours instead: what a factory of a Python module makes, or a server.
+      estimator_args: Keyword arguments of its factory, as a JSON object.
+      give_cad: Give it the mesh of the very object that is seen.
     """
     one_thread_per_process()
     compile_at_once_on_gpus()
@@ -52,55 +60,69 @@ def evaluate_pose(
     from rich.table import Table
 
     from manipose_mj.cli.pose.clouds import PoseClouds
+    from manipose_mj.cli.pose.foreign_views import ForeignViews
     from manipose_mj.console import output
+    from manipose_mj.estimators.settings import chosen_estimator
     from manipose_mj.ppf_jax.data.asset_views import asset_clouds, textured_groups
     from manipose_mj.ppf_jax.data.view_settings import view_setting
     from manipose_mj.ppf_jax.estimator import PoseEstimator
     from manipose_mj.ppf_jax.evaluation.pose_metrics import most_confident, pose_errors, summary
     from manipose_mj.ppf_jax.evaluation.pose_predictions import catalogue_hulls, predict
 
-    if weights is None:
+    foreign = chosen_estimator(estimator, estimator_args, give_cad)
+    if foreign is not None and (weights is not None or labels == "original"):
+        raise InputError("--weights and --labels are of the package's estimator; leave them out")
+    if foreign is not None:
+        own, asked = None, ForeignViews(foreign, setting, views)
+    elif weights is None:
         if labels == "original":
             raise InputError("the package's weights are of unified labels; give --weights FILE")
-        estimator = PoseEstimator.load(name)
+        own, asked = PoseEstimator.load(name), None
     else:
-        estimator = PoseEstimator.from_file(weights, labels=labels)
+        own, asked = PoseEstimator.from_file(weights, labels=labels), None
+    method = own.trained.method if own is not None else str(estimator)
     rows = []
     categories = (name,) if assets is not None else PoseClouds(name).categories
     for category in categories:
         frames = hulls = textured = None
-        if assets is not None:
-            if labels == "original":
-                raise InputError("--assets have unified labels only; leave out --labels original")
+        if assets is not None and labels == "original":
+            raise InputError("--assets have unified labels only; leave out --labels original")
+        if asked is not None:
+            clouds, found = asked.predictions(category, split, assets)
+        elif assets is not None:
             clouds = asset_clouds(assets, name, view_setting(setting), views=views, jobs=jobs)
-            textured = textured_groups(assets)
         else:
             source = PoseClouds(category, jobs=jobs)
             clouds = source.rendered(split, setting, views)
             if labels == "original":
                 frames = source.sources(clouds)
-            else:
-                hulls = catalogue_hulls(clouds)
-        found = predict(estimator, clouds)
+        if assets is not None:
+            textured = textured_groups(assets)
+        elif labels == "unified":
+            hulls = catalogue_hulls(clouds)
+        if own is not None:
+            found = predict(own, clouds)
         errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls, textured=textured)
         sure = summary(errors.of(most_confident(found.confidence, KEPT)))
         figures = {k: v for k, v in summary(errors).items() if not np.isnan(v)}
         rows.append(
             {
                 "category": category,
-                "method": estimator.trained.method,
+                "method": method,
+                "given_cad": give_cad,
                 "setting": setting,
                 "labels": labels,
                 **figures,
                 "confident_deg_mean": sure["deg_mean"],
                 "ms_per_object": found.ms_per_object,
-                "trained_on": category in estimator.trained.categories,
+                "trained_on": None if own is None else category in own.trained.categories,
             }
         )
     if json:
         output.write_json(rows)
         return 0
-    table = Table("category", title=f"{estimator.trained.method}, {setting}, {labels} labels")
+    given = ", given CAD" if give_cad else ""
+    table = Table("category", title=f"{method}{given}, {setting}, {labels} labels")
     heads = (
         "n",
         "cm",
@@ -116,7 +138,7 @@ def evaluate_pose(
         table.add_column(head, justify="right")
     for row in rows:
         table.add_row(
-            row["category"] + ("" if row["trained_on"] else " (unseen)"),
+            row["category"] + (" (unseen)" if row["trained_on"] is False else ""),
             str(row["n"]),
             f"{row['origin_cm_mean']:.2f}",
             f"{row['origin_cm_median']:.2f}",

@@ -63,10 +63,10 @@ def convert(environment: composer.Environment, recording: Recording, mode: str) 
     """
     control_mode(mode)  # an unknown name fails before anything runs
     trace = _traced(environment, recording)
-    task, physics = task_of(environment), environment.physics
     correction = _Correction()
     taken, done = [], 0
     with acting(environment, mode, recording.seed) as mine:
+        task, physics = task_of(environment), environment.physics
         if isinstance(mine.law, TcpPositionDelta | TcpTargetPositionDelta):
             _refuse_turns(mine, trace.targets)
         while done < _PARTS * len(recording.actions):
@@ -116,9 +116,9 @@ class _Correction:
 
 
 def _traced(environment: composer.Environment, recording: Recording) -> _Trace:
-    task, physics = task_of(environment), environment.physics
-    servos = [*task.robot.actuators, task.robot.gripper_actuator]
     with acting(environment, recording.mode, recording.seed):
+        task, physics = task_of(environment), environment.physics
+        servos = [*task.robot.actuators, task.robot.gripper_actuator]
         targets = [np.append(*task.robot.configuration(physics))]
         in_hand = [_in_hand(task, physics)]
         for action in recording.actions:

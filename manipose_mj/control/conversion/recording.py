@@ -80,6 +80,7 @@ def acting(environment: composer.Environment, mode: str, seed: int) -> Iterator[
         yield mine
     finally:
         task.control_mode = usual
+        task_of(environment).control_mode = usual  # of the scene that the reset changed to
 
 
 def task_of(environment: composer.Environment) -> ManipulationTask:

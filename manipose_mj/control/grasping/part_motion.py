@@ -33,6 +33,7 @@ _MAX_CHAINS = 12  # looked at in full
 _FINE = 6  # poses between layers
 _CHECK_EVERY = 2  # of those, for collision
 _DUPLICATE = 0.05  # solutions nearer than this are one [rad]
+_BACKED_OFF = 0.07  # where an open hand must be free that has let go of a handle [m]
 _JERK = 0.25  # largest step of any arm joint between fine poses [rad]
 # Of the hand that comes to a handle.
 APPROACH = replace(CONTACT, arm=0.002, target=0.0)
@@ -180,8 +181,23 @@ def _layers(
                 if not moved_planner.collides(joints[s, column], touching):
                     own.append(joints[s, column])
                     angles.append(tilt)
-        layers.append(_Layer(np.array(own).reshape(-1, 7), np.array(angles)))
+        layer = _Layer(np.array(own).reshape(-1, 7), np.array(angles))
+        if hold.opening_before > hold.opening and k in (0, len(openings) - 1):
+            layer = _with_room_behind(moved_planner, layer, coming)
+        layers.append(layer)
     return layers
+
+
+def _with_room_behind(planner: MotionPlanner, layer: _Layer, query: CollisionQuery) -> _Layer:
+    """Those from which the open hand has room to back off, by where it would be then; all where none has."""
+    if not len(layer.joints):
+        return layer
+    back = np.stack([planner.backed_off(joints, _BACKED_OFF) for joints in layer.joints])
+    joints, solved = solve(back, layer.joints[None])
+    room = np.array(
+        [ok and not planner.collides(q, query) for q, ok in zip(joints[0], solved[0], strict=True)]
+    )
+    return _Layer(layer.joints[room], layer.tilts[room]) if room.any() else layer
 
 
 def _distinct(joints: Float[np.ndarray, "s 7"], solved: np.ndarray) -> list[int]:

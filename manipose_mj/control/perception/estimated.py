@@ -15,7 +15,7 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import Float
 
-from manipose_mj.assets.asset import GraspSet
+from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.perception.estimated_scene import EstimatedScene, EstimatedScenes
 from manipose_mj.control.perception.furniture_perception import FurniturePerception, TrueFurniture
 from manipose_mj.control.perception.known_shapes import KnownShape, known_shapes
@@ -39,7 +39,11 @@ from manipose_mj.tasks.observations.sensor_config import SensorConfig
 CAMERAS = ("front", "left", "right")
 SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
 SENSORS = SensorConfig(
-    cameras=(*CAMERAS, *SPARE_CAMERAS), height=240, width=320, depth_model="structured_light"
+    cameras=(*CAMERAS, *SPARE_CAMERAS),
+    height=240,
+    width=320,
+    depth_model="structured_light",
+    renderer="ray",  # colours that do not depend on the machine; nobody but estimators of others looks
 )
 _SURE = 0.9  # confidence from which on an estimate is kept for as long as it fits what is seen
 _TRUSTED = 0.5  # confidence under which more cameras are asked
@@ -69,6 +73,7 @@ class EstimatedPerception:
         physics: mjcf.Physics,
         *,
         estimators: Callable[[str], Estimator] | None = None,
+        meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
         furniture: FurniturePerception | None = None,
     ) -> None:
         """Compiles nothing yet.
@@ -77,10 +82,12 @@ class EstimatedPerception:
           task: Of an environment whose sensors are `SENSORS`, or others with the same cameras.
           physics: The environment's.
           estimators: The estimator of a category; `PoseEstimator.load` by default.
+          meshes: The mesh of an object, if estimators are given it; planning never sees it.
           furniture: Where drawers and doors are; the simulator by default.
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
+        self._meshes = meshes
         self._furniture = furniture or TrueFurniture(task, physics)
         self._views = ObjectViews(task.task_observables, CAMERAS)
         self._more_views = ObjectViews(task.task_observables, (*CAMERAS, *SPARE_CAMERAS))
@@ -190,11 +197,18 @@ class EstimatedPerception:
         self, name: str, views: tuple[ObjectView, ...], shapes: tuple[KnownShape, ...]
     ) -> SensedPose | None:
         estimator = self._load(self._categories()[name])
-        sensed = sense_pose(estimator, views, shapes, self._keys)
+        sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
         if sensed is not None and sensed.confidence >= _TRUSTED:
             return sensed
         views = self._more_views.of(self._physics, name)
-        return sense_pose(estimator, views, shapes, self._keys)
+        return sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
+
+    def _with_mesh(self, name: str, views: tuple[ObjectView, ...]) -> tuple[ObjectView, ...]:
+        """The views as estimators get them: with the object's mesh, if they are given it."""
+        if self._meshes is None:
+            return views
+        mesh = self._meshes(self._task.objects[name].asset)
+        return tuple(replace(view, mesh=mesh) for view in views)
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
         assert self._scene is not None
@@ -207,6 +221,7 @@ class EstimatedPerception:
             body=body,
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
+            category=self._categories()[name],
         )
 
 

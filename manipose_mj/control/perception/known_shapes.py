@@ -70,7 +70,12 @@ class KnownShape:
         symmetry = _kept(self.label.symmetry, np.asarray(extents, float))
         return KnownShape(
             name=self.name,
-            label=replace(self.label, extents=np.asarray(extents, float), symmetry=symmetry),
+            label=replace(
+                self.label,
+                extents=np.asarray(extents, float),
+                symmetry=symmetry,
+                center=self.label.center * scale,
+            ),
             hulls=hulls,
             surface=self.surface * scale,
             rests=rests,
@@ -95,10 +100,16 @@ def best_fit(
     points_label: Float[np.ndarray, "n 3"],
 ) -> tuple[KnownShape, float]:
     """The shape that, stretched to `extents` [m], is nearest to the points; and its misfit [m]."""
-    stretched = [shape.stretched(extents) for shape in shapes]
-    misfits = [shape.misfit(points_label) for shape in stretched]
+    return nearest_shape([shape.stretched(extents) for shape in shapes], points_label)
+
+
+def nearest_shape(
+    shapes: Sequence[KnownShape], points_label: Float[np.ndarray, "n 3"]
+) -> tuple[KnownShape, float]:
+    """The shape that, as it is, is nearest to the points; and its misfit [m]."""
+    misfits = [shape.misfit(points_label) for shape in shapes]
     best = int(np.argmin(misfits))
-    return stretched[best], misfits[best]
+    return shapes[best], misfits[best]
 
 
 @cache

@@ -61,4 +61,5 @@ class OraclePerception:
             body=body,
             geoms=subtree_geoms(self._model.model, body),
             rests=entity.asset.stable_poses,
+            category=entity.asset.category,
         )

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.perception.known_shapes import KnownShape, best_fit
+from manipose_mj.control.perception.known_shapes import KnownShape, best_fit, nearest_shape
 from manipose_mj.control.perception.object_views import ObjectView
 from manipose_mj.poses import invert, rotation_angle, transform
 
 if TYPE_CHECKING:
-    from manipose_mj.ppf_jax.estimator import PoseEstimate
+    from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 
 MIN_VIEW_POINTS = 32
 _LEAST_CONFIDENCE = 0.05  # of a hypothesis that is looked at beside each camera's first
@@ -80,6 +80,8 @@ def sense_pose(
             local = transform(invert(pose), points)
             if len(shapes) == 1:
                 shape, misfit = shapes[0], shapes[0].misfit(local)
+            elif np.isnan(hypothesis.extents).any():  # nobody said: some known object as it is
+                shape, misfit = nearest_shape(shapes, local)
             else:
                 shape, misfit = best_fit(shapes, _lengths(hypothesis, shapes[0]), local)
             score = misfit * (1 + _DISTRUST * (1 - hypothesis.confidence))

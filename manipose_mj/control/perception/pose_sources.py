@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 from dm_control import mjcf
 
+from manipose_mj.assets.asset import Asset
 from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerception
+from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import unknown_name
+from manipose_mj.estimators.loading import load_estimator
+from manipose_mj.estimators.observation import asset_mesh
+from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
 
@@ -25,13 +31,44 @@ def sensors_for(pose: str) -> SensorConfig:
     return SENSORS if pose == "estimated" else SensorConfig()
 
 
-def make_perception(pose: str, task: ManipulationTask, physics: mjcf.Physics) -> Perception:
+def make_perception(
+    pose: str,
+    task: ManipulationTask,
+    physics: mjcf.Physics,
+    estimator: EstimatorSettings | None = None,
+) -> Perception:
     """The perception of one environment.
 
+    Args:
+      pose: One of `POSE_SOURCES`.
+      task: Of the environment.
+      physics: Of the environment.
+      estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+
     Raises:
-      InputError: There is no such source.
+      InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
-    if pose == "estimated":
+    if pose != "estimated":
+        return OraclePerception(task, physics)
+    if estimator is None:
         return EstimatedPerception(task, physics)
-    return OraclePerception(task, physics)
+    service = load_estimator(estimator)
+
+    return EstimatedPerception(
+        task,
+        physics,
+        estimators=lambda category: ForeignEstimator(service, category),
+        meshes=_mesh_of if estimator.give_cad else None,
+    )
+
+
+_meshes: dict[str, dict[str, np.ndarray]] = {}
+
+
+def _mesh_of(asset: Asset) -> dict[str, np.ndarray]:
+    """The mesh of an asset, read once a process."""
+    where = str(asset.folder)
+    if where not in _meshes:
+        _meshes[where] = asset_mesh(asset)
+    return _meshes[where]

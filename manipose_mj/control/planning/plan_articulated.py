@@ -13,6 +13,7 @@ from manipose_mj.control.planning.regrasp import Poses, routes
 from manipose_mj.control.planning.table_places import (
     DROP_HEIGHT,
     YAWS,
+    rest_of,
     resting_height,
     resting_rotation,
 )
@@ -22,6 +23,7 @@ from manipose_mj.control.scene.cavity_mouth import outwards
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, rotation_about
+from manipose_mj.tasks.articulated.hand_room import Placement, count_clear, hands_around
 from manipose_mj.tasks.goals import InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
 
 PartGoal = InsideGoal | TakenOutGoal | OpenGoal | ShutGoal
@@ -38,6 +40,7 @@ _DRAWER_FRONT = (0.35, 0.5, 0.2, 0.7, 0.95, 0.0, -0.3, -0.6)
 _DOOR_FRONT = (0.95, 0.75, 0.5, 0.25)
 _SIDEWAYS = (0.0, 0.3, -0.3, 0.6, -0.6, 0.95, -0.95)
 _MAX_PER_WAY = 3  # places in the cavity for each way to lie
+_ENOUGH_HANDS = 8  # grasps with room for the hand, from which on more make no place better
 _APART = 0.008  # between objects that lie side by side [m]
 _SAME_SIDE = 0.95  # cosine from which on two verticals are one
 _AREA_SHARES = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
@@ -193,48 +196,71 @@ def poses_in_cavity(
     across = np.cross(_UP, front)
     shares = _DRAWER_FRONT if cavity.moves_with_part else _DOOR_FRONT
     taken = [] if estimate is None else _boxes_inside(estimate, obj, part)
+    open_side = _UP if cavity.moves_with_part else front
     down = obj.label_pose[2, :3]
     found = []
     for rotation in _ways_to_turn(obj):
-        reach = np.abs(rotation) @ obj.label.extents / 2
+        reach = obj.label.reach(rotation)
         slack = (cavity.extents - CAVITY_MARGIN) / 2 - reach
         if (slack < 0).any():
             continue
         height = resting_height(obj, rotation) if obj.rests else reach[2]
         floor = np.array([0.0, 0.0, height + DROP_HEIGHT - cavity.extents[2] / 2])
         other_side = float(rotation[2] @ down) < _SAME_SIDE
-        count = 0
+        hands = _hands(obj, rotation, open_side)
+        # From the middle of its box to the label's origin, and on to the object's.
+        to_label = -(rotation @ obj.label.center) * [1, 1, 0]
+        to_object = to_label - rotation @ obj.label.rotation.T @ obj.label.origin
+        places = []
         for sideways in _SIDEWAYS:
             for share in shares:
                 place_ = (share * front + sideways * across) * slack
-                if count == _MAX_PER_WAY or _meets(place_, reach, taken):
+                if _meets(place_, reach, taken):
                     continue
-                count += 1
-                pose = carrier @ compose(rotation, cavity.center + floor + place_)
-                found.append((other_side, round(reach[2], 4), abs(sideways), -share, pose))
-    found.sort(key=lambda entry: entry[:4])
-    return tuple(entry[4] for entry in found)
+                # Without grasps that are known to come from there, any place is as good.
+                room = count_clear(hands, floor + place_ + to_object, cavity, open_side, taken)
+                places.append((-min(room, _ENOUGH_HANDS), abs(sideways), -share, place_))
+        # Stable: of places with as much room those come first that come first above.
+        places.sort(key=lambda entry: entry[0])
+        for room, off, back, place_ in places[:_MAX_PER_WAY]:
+            pose = carrier @ compose(rotation, cavity.center + floor + place_ + to_label)
+            found.append((other_side, room, round(reach[2], 4), off, back, pose))
+    found.sort(key=lambda entry: entry[:5])
+    return tuple(entry[5] for entry in found)
 
 
-Box = tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]
+def _hands(
+    obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"], open_side: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "k b 8 3"]:
+    """The hand at the grasps that are left when the object's label is turned so in a cavity."""
+    rest = rest_of(obj, rotation)
+    if rest is None:
+        return np.zeros((0, 3, 8, 3))
+    return hands_around(obj.grasps, rest, rotation @ obj.label.rotation.T, open_side)
 
 
-def _boxes_inside(estimate: SceneEstimate, obj: ObjectEstimate, part: PartEstimate) -> list[Box]:
-    """Middle and half lengths along x and y of what lies in the cavity, from the cavity's middle [m]."""
+def _boxes_inside(
+    estimate: SceneEstimate, obj: ObjectEstimate, part: PartEstimate
+) -> list[Placement]:
+    """What lies in the cavity."""
     assert part.cavity is not None
     carrier = part.pose if part.cavity.moves_with_part else part.base_pose
     boxes = []
     for other in estimate.objects.values():
         if other.name != obj.name and lies_inside(other, part):
             pose = invert(carrier) @ other.label_pose
-            reach = np.abs(pose[:3, :3]) @ other.label.extents / 2
-            boxes.append(((pose[:3, 3] - part.cavity.center)[:2], reach[:2]))
+            reach = other.label.reach(pose[:3, :3])
+            middle = pose[:3, :3] @ other.label.center + pose[:3, 3]
+            boxes.append(Placement((middle - part.cavity.center)[:2], reach))
     return boxes
 
 
-def _meets(place_: Float[np.ndarray, "3"], reach: Float[np.ndarray, "3"], taken: list[Box]) -> bool:
+def _meets(
+    place_: Float[np.ndarray, "3"], reach: Float[np.ndarray, "3"], taken: list[Placement]
+) -> bool:
     return any(
-        (np.abs(place_[:2] - middle) < reach[:2] + half + _APART).all() for middle, half in taken
+        (np.abs(place_[:2] - other.place) < reach[:2] + other.reach[:2] + _APART).all()
+        for other in taken
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Plan
@@ -11,6 +12,50 @@ from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutt
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
+
+
+class TaskPlanner(Protocol):
+    """From goals and an estimate of the scene to plans, whoever makes them."""
+
+    def begin(self, instruction: str) -> None:
+        """An episode begins, which asks for this in words."""
+        ...
+
+    def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
+        """Whether each plan is one move only, after which the scene is looked at again."""
+        ...
+
+    def candidates(
+        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+    ) -> Iterator[CandidatePlan]:
+        """Plans that reach the goals, the most promising first, at least one.
+
+        Args:
+          goals: All of them.
+          estimate: What is where.
+          planner: Of motions in the scene of `estimate`.
+
+        Raises:
+          InputError: On the way through them: there is none, or there are no more.
+        """
+        ...
+
+
+class RulePlanner:
+    """Plans by the rules of this module."""
+
+    def begin(self, instruction: str) -> None:
+        """Goals say all that rules need."""
+
+    def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
+        """In clutter."""
+        return in_clutter(goals, estimate)
+
+    def candidates(
+        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+    ) -> Iterator[CandidatePlan]:
+        """As `candidate_plans`."""
+        return candidate_plans(goals, estimate, planner)
 
 
 def candidate_plans(

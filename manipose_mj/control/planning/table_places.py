@@ -39,7 +39,7 @@ def resting_height(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> f
     """
     index = rest_of(obj, rotation)
     if index is None:
-        return float(np.abs(rotation[2]) @ obj.label.extents / 2)
+        return float(obj.label.reach(rotation)[2])
     rest = obj.rests[index]
     return rest.height + float(rest.rotation[2] @ obj.label.origin)
 

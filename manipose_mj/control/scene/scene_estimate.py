@@ -32,6 +32,7 @@ class ObjectEstimate:
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
       rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
+      category: Such as `"mug"`; empty where it is not known.
     """
 
     name: str
@@ -41,6 +42,7 @@ class ObjectEstimate:
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     rests: tuple[StablePose, ...] = ()
+    category: str = ""
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:

@@ -18,6 +18,7 @@ import mujoco
 from markupsafe import Markup
 
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     read_results,
@@ -129,11 +130,19 @@ def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film
 
         objects, split = summary["objects"], summary["split"]
         config = EnvConfig(result.task, obs_mode="state", objects=objects, split=split)
-        model = scene(config, EpisodeSpec(result.seed))
+        model = scene(config, EpisodeSpec(**_asked(result, summary)))
         return shoot(film, model, trajectory, playback)
     except Exception as error:  # the numbers must not be lost for a picture
         logger.debug("episode %d of %s", result.episode, result.task, exc_info=True)
         return replace(film, note=f"no pictures: {' '.join(str(error).split())}")
+
+
+def _asked(result: EpisodeResult, summary: dict[str, Any]) -> dict[str, Any]:
+    """The fields of an episode's `EpisodeSpec`: a protocol asks for objects too."""
+    asked: dict[str, Any] = {}
+    if summary.get("protocol"):
+        asked = protocol.load(summary["protocol"]).episode(result.task, result.episode).asked
+    return {**asked, "seed": result.seed}
 
 
 def _by_object(results: Sequence[EpisodeResult]) -> list[dict[str, Any]]:

@@ -33,6 +33,18 @@ def asset_clouds(
     Raises:
       InputError: There is no such asset in the folder, or one cannot be read.
     """
+    rendered = joblib.Parallel(n_jobs=jobs)(
+        joblib.delayed(views_of)(asset, setting, views) for asset in chosen_assets(directory, name)
+    )
+    return [cloud for clouds in rendered for cloud in clouds]  # pyright: ignore[reportOptionalIterable, reportGeneralTypeIssues]
+
+
+def chosen_assets(directory: Path, name: str) -> list[Asset]:
+    """The rigid assets in a folder that are of a category or a type.
+
+    Raises:
+      InputError: There is no such asset in the folder, or one cannot be read.
+    """
     chosen = [
         asset
         for asset in map(read_asset, list_assets(directory))
@@ -40,10 +52,7 @@ def asset_clouds(
     ]
     if not chosen:
         raise InputError(f"{directory}: no rigid asset of category or type {name!r}")
-    rendered = joblib.Parallel(n_jobs=jobs)(
-        joblib.delayed(views_of)(asset, setting, views) for asset in chosen
-    )
-    return [cloud for clouds in rendered for cloud in clouds]  # pyright: ignore[reportOptionalIterable, reportGeneralTypeIssues]
+    return chosen
 
 
 def textured_groups(directory: Path) -> dict[str, SymmetryGroup]:
@@ -62,11 +71,13 @@ def asset_subject(asset: Asset) -> Subject:
     Raises:
       InputError: Its model or a mesh cannot be read.
     """
+    visible = visible_shapes(asset.folder)
     return Subject.of_mesh(
-        surface(visible_shapes(asset.folder)),
+        surface(visible),
         asset.label,
         name=asset.name,
         category=asset.category,
+        shapes=[shape for own in visible.values() for shape in own],
         rests=[(pose.rotation, pose.height, pose.probability) for pose in asset.stable_poses],
     )
 

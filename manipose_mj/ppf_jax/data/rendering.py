@@ -6,7 +6,7 @@ strays into what is behind, and given the normals that the noisy depth supports.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +14,10 @@ import trimesh
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter, zoom
 
+from manipose_mj.assets.geometry import Shape
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.cameras.depth_noise import KINECT, structured_light
+from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight, structured_light
 from manipose_mj.mjcf.cameras.depth_normals import depth_normals
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 from manipose_mj.poses import transform
@@ -43,6 +44,7 @@ class Subject:
       hull: Corners of its convex hull, mesh frame [m].
       rests: `(R_world_mesh, height [m], probability)` of the ways it lies on a table; may be empty where
         no setting with a table is rendered.
+      shapes: What the surface is made of, with colours; may be empty where nobody asks for colours.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Subject:
     bounds: Float[np.ndarray, "2 3"]
     hull: Float[np.ndarray, "h 3"]
     rests: tuple[tuple[Float[np.ndarray, "3 3"], float, float], ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     @classmethod
     def of_mesh(
@@ -62,10 +65,12 @@ class Subject:
         name: str,
         category: str,
         rests: Sequence[tuple[Float[np.ndarray, "3 3"], float, float]] = (),
+        shapes: Sequence[Shape] = (),
     ) -> Subject:
         """The subject with this surface."""
         bounds, hull = np.asarray(mesh.bounds, float), np.asarray(mesh.convex_hull.vertices)
-        return cls(name, category, label, Triangles.of_mesh(mesh), bounds, hull, tuple(rests))
+        triangles = Triangles.of_mesh(mesh)
+        return cls(name, category, label, triangles, bounds, hull, tuple(rests), tuple(shapes))
 
 
 @dataclass(frozen=True)
@@ -77,14 +82,19 @@ class View:
       mask: The object's pixels as a segmentation reports them.
       exact: What is there.
       intrinsics: Of this window of the image.
-      T_camera_mesh: Where the object is.
+      placement: Where the object is, in which image, and on what.
     """
 
     depth: Float[np.ndarray, "height width"]
     mask: Bool[np.ndarray, "height width"]
     exact: Raster
     intrinsics: Intrinsics
-    T_camera_mesh: Float[np.ndarray, "4 4"]
+    placement: Placement
+
+    @property
+    def T_camera_mesh(self) -> Float[np.ndarray, "4 4"]:
+        """Where the object is."""
+        return self.placement.T_camera_mesh
 
 
 def render_clouds(
@@ -110,14 +120,28 @@ def render_clouds(
       InputError: The setting has a table and the subject no way to lie on it, or hardly any view
         shows enough of the object.
     """
+    drawn = drawn_views(subject, setting, views, rng, occluders=occluders, first=first)
+    return [cloud for _, cloud in drawn]
+
+
+def drawn_views(
+    subject: Subject,
+    setting: ViewSetting,
+    views: int,
+    rng: np.random.Generator,
+    *,
+    occluders: Sequence[Occluder] = (),
+    first: int = 0,
+) -> Iterator[tuple[View, LabelledCloud]]:
+    """The same views, each with its cloud; arguments and errors are those of `render_clouds`."""
     if setting.placement != "anywhere" and not subject.rests:
         raise InputError(f"{subject.name}: setting {setting.name!r} needs its resting poses")
-    clouds = []
-    for view in range(first, first + views):
+    for number in range(first, first + views):
         for _ in range(_DRAWS):
-            cloud = _cloud(subject, setting, rng, occluders, f"{subject.name}/{view}")
+            view = render_view(subject, setting, rng, occluders=occluders)
+            cloud = _cloud(subject, view, rng, f"{subject.name}/{number}")
             if len(cloud) >= MIN_POINTS:
-                clouds.append(cloud)
+                yield view, cloud
                 break
         else:
             raise InputError(
@@ -125,7 +149,6 @@ def render_clouds(
                 f"{MIN_POINTS} points; is it in metres, and are {min(setting.image_heights)} rows enough? "
                 f"Its box is {np.ptp(subject.bounds, axis=0)} m"
             )
-    return clouds
 
 
 def render_view(
@@ -143,14 +166,21 @@ def render_view(
     drawn = rasterise([(subject.triangles, placement.T_camera_mesh)], window)
     if rng.random() < setting.occluded:
         drawn = occluded(drawn, radius, window, rng, occluders)
-    drawn = _grounded(drawn, placement, window)
+    drawn = grounded(drawn, placement, window)
     mask = _bled(drawn.item == 0, setting.bleed * window.fx / KINECT.focal, rng)
-    depth = drawn.depth
-    if setting.sensor is not None:
-        rays = pixel_rays(window)
-        cosine = -np.einsum("hwi,hwi->hw", drawn.normal, rays) / np.linalg.norm(rays, axis=-1)
-        depth = structured_light(depth, cosine, window, rng, setting.sensor)
-    return View(depth, mask, drawn, window, placement.T_camera_mesh)
+    depth = measured(drawn, window, rng, setting.sensor)
+    return View(depth, mask, drawn, window, placement)
+
+
+def measured(
+    drawn: Raster, window: Intrinsics, rng: np.random.Generator, sensor: StructuredLight | None
+) -> Float[np.ndarray, "height width"]:
+    """Depth as a sensor reports it, 0 where it measures nothing [m]; exact where there is none."""
+    if sensor is None:
+        return drawn.depth
+    rays = pixel_rays(window)
+    cosine = -np.einsum("hwi,hwi->hw", drawn.normal, rays) / np.linalg.norm(rays, axis=-1)
+    return structured_light(drawn.depth, cosine, window, rng, sensor)
 
 
 def cloud_of_view(
@@ -165,14 +195,7 @@ def cloud_of_view(
     return points.astype(np.float32), normals.astype(np.float32)
 
 
-def _cloud(
-    subject: Subject,
-    setting: ViewSetting,
-    rng: np.random.Generator,
-    occluders: Sequence[Occluder],
-    name: str,
-) -> LabelledCloud:
-    view = render_view(subject, setting, rng, occluders=occluders)
+def _cloud(subject: Subject, view: View, rng: np.random.Generator, name: str) -> LabelledCloud:
     points, normals = cloud_of_view(view, rng)
     return LabelledCloud(
         points=points,
@@ -197,7 +220,7 @@ def _window(subject: Subject, placement: Placement) -> Intrinsics:
     return replace(k, width=right - left, height=bottom - top, cx=k.cx - left, cy=k.cy - top)
 
 
-def _grounded(drawn: Raster, placement: Placement, window: Intrinsics) -> Raster:
+def grounded(drawn: Raster, placement: Placement, window: Intrinsics) -> Raster:
     """The same before the placement's plane, as item 2."""
     if placement.ground is None:
         return drawn

@@ -129,13 +129,14 @@ def catalogue_subject(category: str, index: int, *, resting: bool, taper: float 
     """
     row = CATALOGUE[category]
     specimen = catalogue.generate(category, index)
-    surface, label = specimen.bodies[0].surface(), specimen.label
+    body, label = specimen.bodies[0], specimen.label
+    surface, shapes = body.surface(), body.visual
     poses = catalogue.stable_poses(specimen) if resting else ()
     rests = [(pose.rotation, pose.height, pose.probability) for pose in poses]
     if taper and taperable(label):
-        surface, label = tapered(surface, label, taper)
+        (surface, label), shapes = tapered(surface, label, taper), ()
     name = row.instance(index)
-    return Subject.of_mesh(surface, label, name=name, category=category, rests=rests)
+    return Subject.of_mesh(surface, label, name=name, category=category, rests=rests, shapes=shapes)
 
 
 def source_labels(clouds: Sequence[LabelledCloud], *, jobs: int = 1) -> dict[str, SourceLabel]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,9 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, Cavity, MovingPart
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
+from manipose_mj.tasks.articulated.hand_room import MAX_WIDTH, Placement, free_grasps
 from manipose_mj.tasks.scene.object_pool import ObjectPool
+from manipose_mj.tasks.scene.resting import placements_between
 
 # Between what lies in a cavity and its walls and ceiling, in all and in each direction [m].
 MARGIN = np.array([0.010, 0.010, 0.004])
@@ -19,11 +22,9 @@ GAP = 0.012
 _LIKELY = 0.06  # share of drops that end in a stable pose
 _LIFT = 0.001  # things are put down from this high [m]
 _TRIES = 40
-# Grasps that must come in this direction, or nearly (a cosine), for an object to be taken out.
-_MIN_GRASPS, _TOWARDS = 6, 0.85
+_MIN_GRASPS = 6  # with room for the hand, for an object to be put in or taken out
 _HALF_HAND = 0.115  # of its width, with some room [m]
 _MIN_CLEAR = 5  # grasps clear of the table with which a stable pose is one to start from
-_MAX_WIDTH = 0.0765  # between the pads [m]; they open 80 mm
 _ROOM_FRONT = 0.04  # room is kept for an object this far from the open side at most [m]
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -50,50 +51,79 @@ class Resting:
         return compose(self.rotation, np.array([*(place - self.center), z]))
 
 
+def ways_stored(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
+    """Those of `ways_in_hand` that grasps lead to from where the asset starts on the table.
+
+    Raises:
+      InputError: There is none.
+    """
+    ways = ways_in_hand(asset, part)
+    between = placements_between(asset)
+    joined = tuple(
+        way for way in ways if any(between[start, way[0]] >= 0 for start in starts(asset))
+    )
+    if not joined:
+        raise InputError(
+            f"part {part.name!r}: no grasps lead {asset.name} from the table to how it fits; choose "
+            "other objects"
+        )
+    return joined
+
+
+def starts_to_store(asset: Asset, part: MovingPart) -> tuple[int, ...]:
+    """Stable poses on the table from which grasps lead to a way that the asset fits in.
+
+    Raises:
+      InputError: There is none.
+    """
+    ways, between = ways_stored(asset, part), placements_between(asset)
+    return tuple(
+        start for start in starts(asset) if any(between[start, way] >= 0 for way, _ in ways)
+    )
+
+
 def starts(asset: Asset) -> tuple[int, ...]:
     """Stable poses on the table in which a hand can take the asset; all of them if there is none."""
     everything = tuple(range(len(asset.stable_poses)))
     if asset.grasps is None:
         return everything
-    narrow = asset.grasps.clear[asset.grasps.widths < _MAX_WIDTH]
+    narrow = asset.grasps.clear[asset.grasps.widths < MAX_WIDTH]
     return tuple(i for i in everything if narrow[:, i].sum() >= _MIN_CLEAR) or everything
 
 
-def hand_room(asset: Asset, part: MovingPart, stable: int, yaw: float) -> bool:
-    """Whether grasps enough come from above, or for what is behind a door from the front."""
-    grasps = asset.grasps
-    if grasps is None:
-        return False
+def room_for_hand(
+    asset: Asset,
+    part: MovingPart,
+    stable: int,
+    lying: Resting,
+    place: Float[np.ndarray, "2"],
+    others: Sequence[Placement] = (),
+) -> int:
+    """How many grasps have room for the hand, from above, or for what is behind a door from the front.
+
+    Args:
+      asset: What lies there.
+      part: A drawer, open, or a door.
+      stable: Index of the stable pose it lies in.
+      lying: How it lies.
+      place: Where, from the cavity's centre [m].
+      others: What lies beside it.
+    """
     cavity = _cavity(part)
-    towards = (
-        np.array([0.0, 0.0, -1.0]) if cavity.moves_with_part else np.append(-outwards_of(part), 0.0)
-    )
-    approaches = grasps.poses[:, :3, 2] @ resting(asset, stable, yaw).rotation.T
-    usable = (approaches @ towards > _TOWARDS) & grasps.clear[:, stable]
-    return int((usable & (grasps.widths < _MAX_WIDTH)).sum()) >= _MIN_GRASPS
-
-
-@dataclass(frozen=True)
-class Placement:
-    """A thing that lies in a cavity: place `(2,)` of its box from the centre, reach `(3,)` [m]."""
-
-    place: Float[np.ndarray, "2"]
-    reach: Float[np.ndarray, "3"]
+    outwards = _UP if cavity.moves_with_part else np.append(outwards_of(part), 0.0)
+    if asset.grasps is None:
+        return 0
+    pose = lying.pose(cavity, place)
+    return free_grasps(asset.grasps, stable, pose, cavity, outwards, others)
 
 
 def resting(asset: Asset, stable: int, yaw: float) -> Resting:
     """The asset in a stable pose, turned by `yaw` [rad] about the vertical."""
     rest = asset.stable_poses[stable]
     rotation = rotation_about(_UP, yaw) @ rest.rotation
-    label = rotation @ asset.label.rotation
-    half = asset.label.extents / 2
-    if asset.label.symmetry.axial:
-        along = np.abs(label[:, 0])
-        radius = half[1:].max()
-        reach = along * half[0] + np.sqrt(np.clip(1 - along**2, 0, 1)) * radius
-    else:
-        reach = np.abs(label) @ half
-    return Resting(rotation, (rotation @ asset.label.origin)[:2], reach, rest.height)
+    reach = asset.label.reach(rotation @ asset.label.rotation)
+    middle = asset.label.origin + asset.label.rotation @ asset.label.center
+    return Resting(rotation, (rotation @ middle)[:2], reach, rest.height)
 
 
 def ways_to_lie(asset: Asset, cavity: Cavity) -> tuple[tuple[int, float], ...]:
@@ -178,19 +208,46 @@ def ways_into(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
     return ways
 
 
-def ways_out(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
-    """Those of `ways_into` out of which a hand can take the asset.
+def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
+    """Those of `ways_into` in which a hand can hold the asset, at least where it lies in the middle.
 
     Raises:
       InputError: There is none.
     """
-    ways = tuple(way for way in ways_into(asset, part) if hand_room(asset, part, *way))
+    ways = tuple(
+        (stable, yaw)
+        for stable, yaw in ways_into(asset, part)
+        if room_for_hand(asset, part, stable, resting(asset, stable, yaw), np.zeros(2))
+        >= _MIN_GRASPS
+    )
     if not ways:
         raise InputError(
             f"part {part.name!r}: a gripper that opens 80 mm can take none of {asset.name} out of it; "
             "choose narrower objects"
         )
     return ways
+
+
+@dataclass(frozen=True)
+class OwnPlace:
+    """Where the object that an episode is about lies in a cavity, or shall lie.
+
+    Attributes:
+      stable: Index of its stable pose.
+      lying: How it lies.
+      place: Of its box, from the cavity's centre [m].
+      room: That is kept around it [m].
+    """
+
+    stable: int
+    lying: Resting
+    place: Float[np.ndarray, "2"]
+    room: float
+
+    @property
+    def kept(self) -> Placement:
+        """What others keep clear of."""
+        return Placement(self.place, self.lying.reach + self.room)
 
 
 class CavityPlacement:
@@ -202,20 +259,18 @@ class CavityPlacement:
         Args:
           pool: Of objects.
           part: In question.
-          taken: Whether the first object is to be taken out: it lies so that a hand can.
+          taken: Whether the first object is to be taken out, or to be stored.
 
         Raises:
-          InputError: An object does not fit the cavity, or the first cannot be taken out of it.
+          InputError: An object does not fit the cavity, or no hand can put the first in or take it out.
         """
         self._assets = tuple(entity.asset for entity in pool.entities)
         self._part = part
         self._ways = [ways_into(asset, part) for asset in self._assets]
-        self._own = ways_out(self._assets[0], part) if taken else self._ways[0]
+        self._own = (ways_in_hand if taken else ways_stored)(self._assets[0], part)
 
-    def inside(
-        self, rng: np.random.RandomState, *, front: float, room: float = 0.0
-    ) -> tuple[Placement, Float[np.ndarray, "4 4"]]:
-        """A place for the object in the empty cavity, and `T_cavity_object` there.
+    def inside(self, rng: np.random.RandomState, *, front: float, room: float = 0.0) -> OwnPlace:
+        """A place for the object in the empty cavity, with room for the hand where there is some.
 
         Args:
           rng: Draws the way to lie and the place.
@@ -225,28 +280,34 @@ class CavityPlacement:
         part = self._part
         stable, yaw = self._own[rng.randint(len(self._own))]
         lying = resting(self._assets[0], stable, yaw)
-        placement = sample_placement(
-            lying,
-            _cavity(part),
-            [],
-            rng,
-            outwards=outwards_of(part),
-            front=front,
-            room=room,
-        )
-        assert placement is not None  # it fits, and nothing is in its way
-        pose = lying.pose(_cavity(part), placement.place)
-        return Placement(placement.place, placement.reach + room), pose
+        place, best = np.zeros(2), -1
+        for _ in range(_TRIES):
+            tried = sample_placement(
+                lying,
+                _cavity(part),
+                [],
+                rng,
+                outwards=outwards_of(part),
+                front=front,
+                room=room,
+            )
+            assert tried is not None  # it fits, and nothing is in its way
+            count = room_for_hand(self._assets[0], part, stable, lying, tried.place)
+            if count > best:
+                place, best = tried.place, count
+            if best >= _MIN_GRASPS:
+                break
+        return OwnPlace(stable, lying, place, room)
 
     def beside(
-        self, rng: np.random.RandomState, count: int, placement: Placement | None = None
+        self, rng: np.random.RandomState, count: int, own: OwnPlace | None = None
     ) -> dict[int, Float[np.ndarray, "4 4"]]:
         """Up to `count` other objects in the cavity that leave room for the object.
 
         Args:
           rng: Draws which and where.
           count: How many others at most.
-          placement: Where the object lies; None: room is kept for it somewhere near the open side.
+          own: Where the object lies; None: room is kept for it somewhere near the open side.
 
         Returns:
           Their indices, with `T_cavity_object` of each.
@@ -254,18 +315,24 @@ class CavityPlacement:
         if not count:
             return {}
         part = self._part
-        if placement is None:
-            placement, _ = self.inside(rng, front=_ROOM_FRONT)
-        taken, found = [placement], {}
+        if own is None:
+            own = self.inside(rng, front=_ROOM_FRONT)
+        enough = min(_MIN_GRASPS, self._room_beside(own, []))
+        taken, found = [own.kept], {}
         for other in 1 + rng.permutation(len(self._assets) - 1)[:count]:
             ways = self._ways[other]
             stable, yaw = ways[rng.randint(len(ways))]
             lying = resting(self._assets[other], stable, yaw)
             place = sample_placement(lying, _cavity(part), taken, rng, outwards=outwards_of(part))
-            if place is not None:
-                taken.append(place)
-                found[int(other)] = lying.pose(_cavity(part), place.place)
+            if place is None or self._room_beside(own, [*taken[1:], place]) < enough:
+                continue
+            taken.append(place)
+            found[int(other)] = lying.pose(_cavity(part), place.place)
         return found
+
+    def _room_beside(self, own: OwnPlace, others: Sequence[Placement]) -> int:
+        asset = self._assets[0]
+        return room_for_hand(asset, self._part, own.stable, own.lying, own.place, others)
 
 
 def outwards_of(part: MovingPart) -> Float[np.ndarray, "2"]:

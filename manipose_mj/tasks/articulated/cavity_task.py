@@ -9,7 +9,7 @@ from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.tasks.articulated.cavity_placement import CavityPlacement, Placement
+from manipose_mj.tasks.articulated.cavity_placement import CavityPlacement, OwnPlace
 from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion
 from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
 from manipose_mj.tasks.articulated.placement import Standing, side
@@ -89,18 +89,18 @@ class CavityTask(FurnitureTask):
         return place
 
     def sample_fillers(
-        self, rng: np.random.RandomState, placement: Placement | None = None
+        self, rng: np.random.RandomState, own: OwnPlace | None = None
     ) -> dict[int, Float[np.ndarray, "4 4"]]:
         """Draw other objects for the cavity.
 
         Args:
           rng: Draws how many, which and where.
-          placement: Where the object lies in the cavity; None: room is kept for it.
+          own: Where the object lies in the cavity; None: room is kept for it.
 
         Returns:
           Their indices in the pool, with `T_cavity_object` of each.
         """
-        return self.placement.beside(rng, int(rng.randint(self.max_fillers + 1)), placement)
+        return self.placement.beside(rng, int(rng.randint(self.max_fillers + 1)), own)
 
     def cavity_of(self, preview: Preview, furniture: PlacedFurniture) -> Float[np.ndarray, "4 4"]:
         """`T_world_cavity` of the part in question while a piece stands so."""

@@ -11,7 +11,7 @@ import numpy as np
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.assets.categories import CATALOGUE, Category, Split
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.articulated.cavity_placement import ways_into, ways_out
+from manipose_mj.tasks.articulated.cavity_placement import ways_in_hand, ways_into, ways_stored
 from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part, possible_parts
 from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, chosen, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -176,7 +176,7 @@ def with_cavity(requested: RequestedFurniture, *, taken: bool, fillers: int) -> 
 
 def _subject(asset: Asset, *, part: MovingPart, taken: bool) -> None:
     require_graspable(asset)
-    (ways_out if taken else ways_into)(asset, part)
+    (ways_in_hand if taken else ways_stored)(asset, part)
 
 
 def _shorter_than(

@@ -56,7 +56,7 @@ def possible_parts(asset: Asset, choice: PartChoice, *, hollow: bool) -> tuple[M
     known = ", ".join(f"{p.name} ({kind_of(p)})" for p in asset.parts) or "none"
     handled = [part for part in asset.parts if part.handle is not None]
     for kind in choice.kinds:
-        rows = _rows([part for part in handled if kind_of(part) == kind])
+        rows = rows_of([part for part in handled if kind_of(part) == kind])
         if len(rows) < (1 if choice.level is None else _LEAST[choice.level]):
             continue
         found = _at_level(rows, choice.level)
@@ -84,7 +84,7 @@ def named_part(asset: Asset, name: str) -> MovingPart:
     return parts[name]
 
 
-def _rows(parts: list[MovingPart]) -> list[list[MovingPart]]:
+def rows_of(parts: list[MovingPart]) -> list[list[MovingPart]]:
     """Parts side by side, with handles of one height, from the lowest row to the highest."""
     rows: list[list[MovingPart]] = []
     for part in sorted(parts, key=_handle_height):

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.mjcf.arena import FIXED_CAMERAS
+from manipose_mj.mjcf.panda.geometry import CAPSULES
 from manipose_mj.mjcf.panda.kinematics import HOME, link_poses, tcp_pose
 from manipose_mj.mjcf.panda.reachability import is_reachable
 from manipose_mj.poses import invert
@@ -48,10 +49,10 @@ _FOREARM_RADIUS = 0.07
 _RADII = np.append(_HAND[:, 3], np.full(len(_FOREARM), _FOREARM_RADIUS))
 _OPENING_MARGIN = 0.012  # of the fingers as they come, beside what they take, in all [m]
 _STANDOFF = 0.07  # from which the handle is approached [m]
-# The robot's foot and shoulder, and the arm at home, which nothing may come near [m].
+# The robot's foot and shoulder, and the arm at home, which nothing may come near, lest it cannot leave [m].
 _FOOT = np.array([(0.0, 0.0, z) for z in np.arange(-1.2, 0.5, 0.1)])
 _FOOT_RADIUS = 0.21
-_HOME_RADIUS = 0.10
+_HAND_RADIUS, _HOME_ROOM = 0.10, 0.035
 _OBJECT_RADIUS = 0.06
 # From the camera that every picture of an episode is taken from, to the handle; and room around it [m].
 _CAMERA = np.array(FIXED_CAMERAS["overview"][0])
@@ -141,7 +142,7 @@ class PlaceScore:
         """Whether the furniture, and the part all along, stays off the robot's foot, the arm at home and
         the objects."""
         shape, clear = self.shape, np.ones(len(bases), bool)
-        base_points = [(_FOOT, _FOOT_RADIUS, True), (_home_points(), _HOME_RADIUS, False)]
+        base_points = [(_FOOT, _FOOT_RADIUS, True), (*_arm_at_home(), False)]
         if self.objects is not None:
             base_points.append((self.objects, _OBJECT_RADIUS, True))
         inverse = invert(bases)
@@ -254,10 +255,16 @@ def _distance(
     return least
 
 
-def _home_points() -> Float[np.ndarray, "n 3"]:
-    """Along the arm at home."""
-    joints = np.concatenate([link_poses(HOME)[:, :3, 3], tcp_pose(HOME)[None, :3, 3]])
+def _arm_at_home() -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]]:
+    """Points along links and hand at home, in the base frame, and how near nothing may come to each [m]."""
     shares = np.linspace(0, 1, 5)[:, None]
-    return np.concatenate(
-        [(1 - shares) * a + shares * b for a, b in zip(joints, joints[1:], strict=False)]
-    )
+    links = link_poses(HOME)
+    points, radii = [], []
+    for i, link in enumerate(links, 1):
+        for ends, radius in CAPSULES[f"link{i}"]:
+            a, b = (link[:3, :3] @ np.array(end) + link[:3, 3] for end in (ends[:3], ends[3:]))
+            points.append((1 - shares) * a + shares * b)
+            radii.append(np.full(len(shares), radius + _HOME_ROOM))
+    points.append((1 - shares) * links[-1][:3, 3] + shares * tcp_pose(HOME)[:3, 3])
+    radii.append(np.full(len(shares), _HAND_RADIUS))
+    return np.concatenate(points), np.concatenate(radii)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.tasks.articulated.cavity_placement import starts
+from manipose_mj.tasks.articulated.cavity_placement import starts_to_store
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
 from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
@@ -69,7 +69,7 @@ class Store(CavityTask):
         config = self.task_config
         furniture, mount = self.pieces.sample(rng, 0)
         asset = self.pool.entities[0].asset
-        possible = starts(asset)
+        possible = starts_to_store(asset, self.part)
         rest = possible[rng.randint(len(possible))]
         xy = self.sample_place(rng, config.x_range, config.y_range)
         pose = pose_on_table(asset, rest, xy, rng.uniform(-np.pi, np.pi))

@@ -77,10 +77,12 @@ class TakeOut(CavityTask):
         config = self.task_config
         furniture, mount = self.pieces.sample(rng, 0)
         center = self.sample_place(rng, config.x_range, config.y_range)
-        placement, inside = self.placement.inside(rng, front=config.front, room=config.room)
-        fillers = self.sample_fillers(rng, placement)
+        own = self.placement.inside(rng, front=config.front, room=config.room)
+        fillers = self.sample_fillers(rng, own)
         cavity = self.cavity_of(preview, furniture)
         part = self.part.name
+        assert self.part.cavity is not None
+        inside = own.lying.pose(self.part.cavity, own.place)
         return EpisodeStart(
             goals=(
                 TakenOutGoal("object", part, center, np.array(config.area)),

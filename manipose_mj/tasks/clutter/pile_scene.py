@@ -25,10 +25,6 @@ _STANDOFF = 0.10  # from which a hand comes straight to a grasp [m]
 _FINGER_MARGIN = 0.002  # kept between the open hand and other objects [m]
 _TABLE_MARGIN = 0.001  # and the table
 _MIN_LEVEL = 0.5  # of a contact's normal along the vertical, from which on it carries
-# The no-slip solver takes three quarters of the time of ten objects in contact; stiffer friction
-# alone lets a pile creep by less than 0.1 mm/s.
-IMPRATIO = 100.0
-NOSLIP_ITERATIONS = 0
 # Half of other tasks': what the arm flips over or flings out of a pile spins, and its ends meet other
 # objects at 4 m/s. Contacts in between would not be seen before they are 8 mm deep.
 PILE_TIMESTEP = 0.001  # [s]
@@ -276,7 +272,6 @@ def _compiled(assets: Sequence[Asset], radius: float) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     set_physics(spec.option, _DROP_TIMESTEP)
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
-    spec.option.impratio, spec.option.noslip_iterations = IMPRATIO, NOSLIP_ITERATIONS
     spec.memory = 64 * 2**20
     world = spec.worldbody
     table = world.add_geom(

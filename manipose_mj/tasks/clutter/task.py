@@ -16,12 +16,7 @@ from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.clutter.lying_pile import LyingPile
 from manipose_mj.tasks.clutter.pile_cache import PileCache
 from manipose_mj.tasks.clutter.pile_layout import PileConfig
-from manipose_mj.tasks.clutter.pile_scene import (
-    IMPRATIO,
-    NOSLIP_ITERATIONS,
-    PILE_CONTACT_TIME,
-    PILE_TIMESTEP,
-)
+from manipose_mj.tasks.clutter.pile_scene import PILE_CONTACT_TIME, PILE_TIMESTEP
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.start import EpisodeStart, NoStartError
@@ -86,9 +81,7 @@ class Clutter(ManipulationTask):
         for asset in assets:
             require_graspable(asset)
         option = self.scene.arena.mjcf_model.option
-        option.set_attributes(
-            impratio=IMPRATIO, noslip_iterations=NOSLIP_ITERATIONS, sleep_tolerance=_SLEEP_SPEED
-        )
+        option.sleep_tolerance = _SLEEP_SPEED
         # The native one overstates how deep cylinders reach into boxes beside them, 7 mm for 1.
         option.flag.nativeccd = "disable"
         self.physics_timestep = PILE_TIMESTEP

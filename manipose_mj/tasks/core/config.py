@@ -97,12 +97,14 @@ class EpisodeSpec:
         draws one.
       furniture: Name of the articulated asset, likewise.
       part: Name of the drawer or door that it shall be about, likewise.
+      goal: `T_world_label` that the object shall have in the end, rows of a `(4, 4)` matrix; None draws it.
     """
 
     seed: int | None = None
     object: str | None = None
     furniture: str | None = None
     part: str | None = None
+    goal: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True)

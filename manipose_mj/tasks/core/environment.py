@@ -174,8 +174,24 @@ class TaskEnvironment(composer.Environment):
         self._hooks, self._observation_updater = scene.hooks, scene.observation_updater
         self._mjcf_never_compiled = scene.never_reset
 
-    def step(self, action: Any) -> dm_env.TimeStep:
-        """Go on by one control step; after an episode's end, or before the first, reset."""
+    def step(self, action: Any, *, observe: bool = True) -> dm_env.TimeStep:
+        """Go on by one control step; after an episode's end, or before the first, reset.
+
+        Args:
+          action: Of the control mode; None: the servos go on as the last action said.
+          observe: Whether somebody looks; else the observation is the last one that somebody looked at, and no
+            picture is drawn.
+        """
+        if observe or self._reset_next_step:
+            return self._stepped(action)
+        looking = self._observation_updater
+        self._observation_updater: Any = _NotLooking(self._last_observation)
+        try:
+            return self._stepped(action)
+        finally:
+            self._observation_updater = looking
+
+    def _stepped(self, action: Any) -> dm_env.TimeStep:
         try:
             # Asked once a control step: asking at every physics step takes as long as a step.
             with self._physics.check_invalid_state():
@@ -210,6 +226,20 @@ class TaskEnvironment(composer.Environment):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (self._rebuild, self._random_state.get_state())
+
+
+class _NotLooking:
+    """Takes an updater's place in a step that nobody observes; all schedules stand still."""
+
+    def __init__(self, observation: Any) -> None:
+        self._observation = observation
+
+    def prepare_for_next_control_step(self) -> None: ...
+
+    def update(self) -> None: ...
+
+    def get_observation(self) -> Any:
+        return self._observation
 
 
 def _rebuilt(rebuild: Callable[[], Any], state: Any) -> Any:

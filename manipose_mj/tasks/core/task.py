@@ -19,6 +19,7 @@ from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.mjcf.sleep import sleep_disabled
 from manipose_mj.poses import pose_error
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.own_goal import with_goal
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.randomisation import Delay, Randomiser, randomisation, write_changes
 from manipose_mj.tasks.core.scene import Scene
@@ -176,7 +177,10 @@ class ManipulationTask(composer.Task):
             self._preview = Preview(self._physics, self.scene)
         changes = self._randomiser.draw(rng)
         self._preview.change(changes)
-        start = self.sample(rng, spec or EpisodeSpec(), self._preview)
+        spec = spec or EpisodeSpec()
+        start = self.sample(rng, spec, self._preview)
+        if spec.goal is not None:
+            start = with_goal(start, np.array(spec.goal))
         # The seed is drawn whatever the sensors: the next episode shall not depend on what is observed.
         return replace(start, model=changes, noise_seed=int(rng.randint(2**31)))
 
@@ -290,9 +294,12 @@ class ManipulationTask(composer.Task):
     def before_step(
         self,
         physics: mjcf.Physics,
-        action: Float[np.ndarray, "n"],
+        action: Float[np.ndarray, "n"] | None,
         random_state: np.random.RandomState,
     ) -> None:
+        """Take the action of this control step; None: the servos go on as the last action said."""
+        if action is None:
+            return
         mode = self.control_mode
         mode.begin(
             physics, self.robot, actions.checked_action(mode.name, self._action_shape, action)
@@ -301,7 +308,7 @@ class ManipulationTask(composer.Task):
     def before_substep(
         self,
         physics: mjcf.Physics,
-        action: Float[np.ndarray, "n"],
+        action: Float[np.ndarray, "n"] | None,
         random_state: np.random.RandomState,
     ) -> None:
         target = self._target

@@ -111,8 +111,13 @@ class TakenOutGoal(Goal):
 
 
 def _in_cavity(obj: ObjectState, part: PartState) -> Float[Array, "*#b 4 4"]:
-    """`T_cavity_label`."""
-    return invert(part.cavity_pose) @ obj.label_pose
+    """`T_cavity_box`: the label's axes, in the middle of the object's bounding box."""
+    pose = invert(part.cavity_pose) @ obj.label_pose
+    xp = namespace(pose)
+    center = xp.asarray(obj.center, dtype=pose.dtype)
+    moved = pose[..., :3, :3] @ center[..., None]
+    shift = xp.concat([xp.zeros_like(pose[..., :3, :3]), moved], axis=-1)
+    return pose + xp.concat([shift, xp.zeros_like(pose[..., 3:, :])], axis=-2)
 
 
 def _half_extents(part: PartState, pose: Array) -> Float[Array, "*#b 3"]:

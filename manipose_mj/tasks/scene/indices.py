@@ -67,6 +67,7 @@ class SceneShapes:
     Attributes:
       frames: `T_body_label` of the objects, `T_body_handle` and `T_body_cavity` of the parts.
       extents: Of the objects' bounding boxes, along their labels' axes [m].
+      centers: Of those boxes, in the label frames [m].
       symmetries: Of the objects.
       ranges: Of the parts' joints [m or rad].
       cavity_extents: Full lengths [m]; zero without a cavity.
@@ -75,6 +76,7 @@ class SceneShapes:
 
     frames: Float[Array, "*b bodies 4 4"]
     extents: Float[Array, "*b objects 3"]
+    centers: Float[Array, "*b objects 3"]
     symmetries: tuple[SymmetryGroup, ...]
     ranges: Float[Array, "*b parts 2"]
     cavity_extents: Float[Array, "*b parts 3"]
@@ -87,6 +89,7 @@ class SceneShapes:
         return SceneShapes(
             frames=self.frames[..., rows, :, :],
             extents=self.extents[..., chosen, :],
+            centers=self.centers[..., chosen, :],
             symmetries=tuple(self.symmetries[i] for i in objects),
             ranges=self.ranges[..., opened, :],
             cavity_extents=self.cavity_extents[..., opened, :],
@@ -152,6 +155,7 @@ def shapes_of(
     return SceneShapes(
         frames=np.array(frames, float).reshape(-1, 4, 4),
         extents=np.array([label.extents for label in labels], float).reshape(-1, 3),
+        centers=np.array([label.center for label in labels], float).reshape(-1, 3),
         symmetries=tuple(label.symmetry for label in labels),
         ranges=np.array([part.joint.range for part in parts], float).reshape(-1, 2),
         cavity_extents=np.array(cavities, float).reshape(-1, 3),

@@ -54,6 +54,7 @@ def read(indices: SceneIndices, shapes: SceneShapes, data: PhysicsArrays) -> Sce
         linear_speed, angular_speed = _each(speeds[i])
         objects[name] = ObjectState(
             extents=shapes.extents[..., i, :],
+            center=shapes.centers[..., i, :],
             symmetry=shapes.symmetries[i],
             label_pose=frames[i],
             linear_speed=linear_speed,

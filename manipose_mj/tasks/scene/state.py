@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.poses import Array, SymmetryGroup
@@ -26,6 +27,7 @@ class ObjectState:
       angular_speed: [rad/s].
       touched: Whether the robot touches it.
       held: Whether both finger pads touch it.
+      center: Of its bounding box, in the label's frame [m].
     """
 
     extents: Float[Array, "*#b 3"]
@@ -35,6 +37,7 @@ class ObjectState:
     angular_speed: Float[Array, "*#b"]
     touched: Bool[Array, "*#b"]
     held: Bool[Array, "*#b"]
+    center: Float[Array, "*#b 3"] = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)

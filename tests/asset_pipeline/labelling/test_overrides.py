@@ -253,6 +253,7 @@ def test_handles_and_joints_reach_asset_and_model(tmp_path):
     np.testing.assert_allclose(after.part("drawer").joint.axis, asset.part("drawer").joint.axis)
 
 
+@pytest.mark.full
 def test_builds_read_labels_and_know_when_an_entry_changed(tmp_path, caplog):
     box = files.box((0.2, 0.25, 0.3))  # too wide to grasp: quick
     content = {"models/Blue_Box/model.obj": files.obj(box)}

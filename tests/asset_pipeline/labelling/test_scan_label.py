@@ -58,6 +58,7 @@ def test_a_box_that_is_said_to_be_axial_is_laid_like_a_box():
     assert _angle(np.abs(label.rotation[:, 1]), np.array([0, 1.0, 0])) < 0.5
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("extents", "members"),
     [((0.04, 0.06, 0.1), 4), ((0.06, 0.06, 0.1), 8)],
@@ -71,6 +72,7 @@ def test_a_box_lies_along_its_sides(extents, members):
     assert {"plane", "second_plane", "half_turn"} <= set(quality.residuals)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lying", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
 def test_a_boxs_axes_go_by_its_lengths_however_it_lies(lying):
     extents = np.array([0.11, 0.07, 0.045])[list(lying)]
@@ -129,6 +131,7 @@ def test_a_lump_without_a_plane_says_that_it_is_guessed():
     assert quality.residuals["plane"] > 0.003
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("striped", [False, True])
 def test_ends_are_alike_only_where_the_print_is(tmp_path: Path, striped: bool):
     tin = trimesh.creation.cylinder(0.03, 0.1)

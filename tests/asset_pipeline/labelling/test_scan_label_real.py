@@ -69,6 +69,7 @@ def test_boxes_that_bulge_and_lids_that_miss_their_glass_keep_their_planes(name,
     assert label.rotation[2, 0] > np.cos(np.deg2rad(3))
 
 
+@pytest.mark.full
 def test_the_pitcher_looks_towards_its_handle_and_the_toy_plane_stands_on_its_wheels():
     pitcher, _ = _labelled(_opened("019_pitcher_base"))
     plane, _ = _labelled(_opened("072-a_toy_airplane"))
@@ -82,6 +83,7 @@ def test_the_pitcher_looks_towards_its_handle_and_the_toy_plane_stands_on_its_wh
     assert np.ptp(handle[:, 0]) > 0.1 and np.ptp(handle[:, 2]) < 0.04
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("told", ["axial", "mirror"])
 @pytest.mark.parametrize(
     ("archive", "name", "beyond"),  # where the handle is, seen in pictures: beyond this x [m]

@@ -218,6 +218,7 @@ def test_real_objects_have_the_size_of_real_ones():
         assert scan.mesh.extents[2] == pytest.approx(0.105, abs=0.002)
 
 
+@pytest.mark.full
 @needs_data
 def test_real_plate_builds(tmp_path):
     name = "Room_Essentials_Salad_Plate_Turquoise"

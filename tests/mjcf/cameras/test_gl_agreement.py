@@ -52,6 +52,7 @@ for task in (("single_object", "target_pose"), ("articulated", "store_chips_can_
 """
 
 
+@pytest.mark.full
 def test_tasks_look_the_same_through_gl():
     works = [b for b in ("osmesa", "egl") if gl.probe(b).works]
     if not works:

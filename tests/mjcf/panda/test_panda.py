@@ -10,6 +10,7 @@ import pytest
 from dm_control import composer, mjcf
 
 from manipose_mj.assets import franka_hand
+from manipose_mj.assets.physics import CONE, IMPRATIO, INTEGRATOR
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda import geometry as panda_geometry
 from manipose_mj.mjcf.panda import kinematics as panda_kinematics
@@ -36,10 +37,9 @@ def make_scene(visuals="primitive", shape=None, size=(), at=(0.45, 0.0, 0.35), m
     arena = composer.Arena()
     arena.mjcf_model.option.set_attributes(
         timestep=0.002,
-        cone="elliptic",
-        impratio=10,
-        noslip_iterations=10,
-        integrator="implicitfast",
+        cone=CONE,
+        impratio=IMPRATIO,
+        integrator=INTEGRATOR,
     )
     if shape:
         body = arena.mjcf_model.worldbody.add("body", name="object", pos=at)

@@ -133,6 +133,7 @@ def test_one_candidate_is_the_bodys_frame():
         assert right.sum() == 1 and truth[:, 0] @ others[right][0][:, 0] > 0.999
 
 
+@pytest.mark.full
 def test_gradients_of_taken_rows_are_those_of_indexing():
     rng = np.random.default_rng(0)
     rows = jnp.asarray(rng.normal(size=(7, 3)), jnp.float32)

@@ -94,6 +94,7 @@ def test_votes_that_know_the_truth_give_it_back(mugs, config):
     assert float(found.confidence[0]) > 0.8
 
 
+@pytest.mark.full
 def test_it_trains_estimates_and_is_kept(mugs, config, tmp_path):
     def batches(start):
         while True:

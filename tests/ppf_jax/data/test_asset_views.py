@@ -12,6 +12,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.data.asset_views import asset_clouds
 from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
+from manipose_mj.ppf_jax.data.view_stream import asset_views
 
 QUICK = ViewSetting("quick", "anywhere", image_heights=(240,), bleed=0.0, sensor=None)
 
@@ -46,6 +47,13 @@ def test_assets_of_a_category_or_a_type_are_seen(folder, name):
     for cloud in clouds:
         own = transform(invert(cloud.pose), cloud.points)
         assert (own > bounds.min(axis=0) - 1e-3).all() and (own < bounds.max(axis=0) + 1e-3).all()
+
+
+def test_whole_images_of_assets_are_those_of_their_clouds(folder):
+    clouds = asset_clouds(folder, "razor", QUICK, views=2)
+    for seen, cloud in zip(asset_views(folder, "razor", QUICK, 2), clouds, strict=True):
+        np.testing.assert_array_equal(seen.cloud.points, cloud.points)
+        assert seen.picture.rgb[seen.picture.visible].max() > 60
 
 
 def test_what_is_not_there_is_named(folder):

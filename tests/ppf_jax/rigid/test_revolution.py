@@ -56,7 +56,7 @@ def _off(points, views, rotation, origin, mask=None):
     return tilt, float(np.linalg.norm(np.asarray(moved)[1:]))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("profile", [_goblet, _tube])
 @pytest.mark.parametrize("wall", [0.0, 0.1])
 def test_a_frame_that_is_off_is_put_right(profile, wall):
@@ -118,6 +118,7 @@ def test_what_cannot_be_told_stays_as_it_was():
     assert rotation_angle(np.asarray(found), turn) < np.radians(0.5)
 
 
+@pytest.mark.full
 def test_it_maps_over_a_batch():
     rng = np.random.default_rng(3)
     clouds = [_seen(_goblet, rng) for _ in range(2)]

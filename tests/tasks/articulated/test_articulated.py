@@ -14,7 +14,7 @@ from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
-from manipose_mj.poses import compose, invert
+from manipose_mj.poses import compose, invert, transform
 from manipose_mj.tasks.articulated.cavity_placement import resting, ways_to_lie
 from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of, possible_parts
 from manipose_mj.tasks.articulated.registered import OPENABLES
@@ -143,6 +143,15 @@ def test_every_way_to_lie_in_a_cavity_counts_as_inside():
             assert inside_cavity(pose, extents, axial, cavity.extents, 0.002), (name, stable)
             sunk = compose(np.eye(3), np.array([0.0, 0.0, -0.15])) @ pose
             assert not inside_cavity(sunk, extents, axial, cavity.extents, 0.002)
+
+
+def test_a_tool_lies_about_the_middle_of_its_box():
+    pencil = catalogue.load("pencil", 4)
+    assert abs(pencil.label.center[0]) > 0.04  # its origin is near its point
+    lying = resting(pencil, 0, 0.4)
+    ends = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) * pencil.label.extents + pencil.label.center
+    middle = transform(pencil.label.pose, ends) @ lying.rotation.T
+    np.testing.assert_allclose(middle.mean(axis=0)[:2], lying.center, atol=1e-6)
 
 
 def test_taken_out_is_met_on_the_marked_area_with_the_drawer_shut():

@@ -81,6 +81,7 @@ def test_instances_differ_from_episode_to_episode_and_observations_keep_their_sh
     assert len(names) > 4
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "task",
     ["articulated/open_cabinet_door", "articulated/store_top_drawer", "single_object/orientation"],
@@ -130,6 +131,7 @@ def test_the_control_mode_stays_when_the_scene_changes():
         environment.step(np.zeros(7))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["articulated/open_cabinet_door", "articulated/close_top_drawer"])
 def test_evaluations_take_every_piece_of_furniture_with_all_its_parts(name):
     scenes = SceneSource(named_task(name), EnvConfig(name, objects=few(name)))

@@ -34,7 +34,7 @@ def _load(task, seed):
     return load(*task, seed=seed, obs_mode="state+pose", reward_mode="dense")
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_what_follows_a_restored_snapshot_is_the_same(task):
     environment = _load(task, 3)
@@ -57,6 +57,7 @@ def test_what_follows_a_restored_snapshot_is_the_same(task):
                 assert (_bits(where, step), step.reward) == bits[later], (index, later)
 
 
+@pytest.mark.full
 def test_the_next_episode_after_a_restored_one_is_the_same_too():
     environment = _load(suite.ALL_TASKS[0], 5)
     environment.reset()
@@ -79,6 +80,7 @@ def test_the_observation_of_the_snapshot_comes_back():
         np.testing.assert_allclose(observation[name], value, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.full
 def test_two_processes_play_the_same_episode():
     script = (
         "import hashlib, numpy as np\n"

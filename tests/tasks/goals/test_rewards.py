@@ -140,6 +140,7 @@ def test_numpy_and_jax_agree_on_batches():
         np.testing.assert_allclose(both, _rewards(goals, states), atol=1e-5)
 
 
+@pytest.mark.full
 def test_it_rises_along_a_success_of_the_baseline():
     environment = load("single_object", "target_pose", 1, obs_mode="state", reward_mode="dense")
     environment.reset()

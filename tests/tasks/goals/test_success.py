@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -154,6 +155,17 @@ def _state(asarray, **case) -> SceneState:
 def test_storing_needs_every_condition(asarray, changes, met):
     goals = (InsideGoal("can", "drawer"), ShutGoal("drawer"))
     assert bool(success(goals, _state(asarray, **changes), TOLERANCE)) is met
+
+
+@pytest.mark.parametrize(("beyond", "met"), [(0.0, True), (0.08, False)])
+def test_a_tool_is_inside_by_its_box_and_not_by_its_origin(asarray, beyond, met):
+    """A screwdriver's origin is nearer to one end: its box, not its origin, has to lie in the middle."""
+    center = np.array([0.06, 0.0, 0.0])
+    tool = {"extents": np.array([0.2, 0.03, 0.03]), "center": center}
+    state = _state(asarray, label_pose=_pose(shift=beyond * X - center))
+    lying = replace(state.objects["can"], **{k: asarray(v) for k, v in tool.items()})
+    state = replace(state, objects={"can": lying})
+    assert bool(success((InsideGoal("can", "drawer"),), state, TOLERANCE)) is met
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,7 @@ def test_what_is_equivalent_or_ordered_stays_so():
         assert np.all(order < 1e-3 * batch.extents[:, 1:])
 
 
+@pytest.mark.full
 def test_a_quarter_of_the_clouds_get_outliers_and_the_label_stays():
     clouds = half_visible_clouds("mug", [0, 1], 100, points=100)
     batch = batch_clouds(clouds, rng=np.random.default_rng(0), points=120)

@@ -1,0 +1,42 @@
+"""Fill the leaderboard's page from the cards in `leaderboard/` while the site is built."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+LEADERBOARD = Path(__file__).parents[2] / "leaderboard"
+PAGE, PLACE = "results/leaderboard.md", "<!-- cards -->"
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """The page with its tables."""
+    return markdown.replace(PLACE, tables()) if page.file.src_uri == PAGE else markdown
+
+
+def tables(folder: Path = LEADERBOARD) -> str:
+    """A table of all runs, and each card's text below it."""
+    rows, texts = [], []
+    for path in sorted(folder.glob("*/card.json")):
+        card = json.loads(path.read_text(encoding="utf-8"))
+        rows += [_row(card, run) for run in card["runs"]]
+        text = path.with_name("card.md").read_text(encoding="utf-8")
+        # One level lower: the page has a title of its own.
+        texts.append(
+            "\n".join(f"#{line}" if line.startswith("#") else line for line in text.splitlines())
+        )
+    head = "| method | seeds | tasks | episodes | at end | once | training data |"
+    rule = "| --- | --- | ---: | ---: | ---: | ---: | --- |"
+    return "\n".join([head, rule, *rows]) + "\n\n" + "\n\n".join(texts)
+
+
+def _row(card: dict[str, Any], run: dict[str, Any]) -> str:
+    seeds = "frozen" if run["resample"] is None else f"resampled from {run['resample']}"
+    episodes = sum(task["n"] for task in run["tasks"].values())
+    url = card["code_url"]
+    name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
+    return (
+        f"| {name} | {run['protocol']}, {seeds} | {len(run['tasks'])} | {episodes} | "
+        f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {card['training_data']} |"
+    )

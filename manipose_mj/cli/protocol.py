@@ -1,0 +1,117 @@
+"""`manipose protocol`: certificates that a protocol's starts can be solved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+from tyro.extras import SubcommandApp
+
+from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.errors import InputError
+
+_EXIT_FAILED = 1
+
+
+def build_app() -> SubcommandApp:
+    """The commands under `manipose protocol`."""
+    app = SubcommandApp()
+    app.command(name="verify")(verify_protocol)
+    app.command(name="certify")(certify_protocol)
+    return app
+
+
+def verify_protocol(
+    version: Annotated[Positional[str], arg(metavar="VERSION", help_behavior_hint="")] = "v1",
+    /,
+    *,
+    tasks: Annotated[tuple[str, ...], arg(metavar="TASK...", help_behavior_hint="")] = (),
+    episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
+    jobs: int = CORES,
+    certificates: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+) -> int:
+    """Replay the certificates of a protocol's starts: the baseline must solve each again.
+
+    Args:
+      version: Of the protocol.
+      tasks: Only these; by default all.
+      episodes: Only the first so many of each task; by default all.
+      jobs: Episodes at the same time, one core each.
+      certificates: File of certificates; by default the package's own.
+    """
+    one_thread_per_process()
+    from manipose_mj.console import output
+    from manipose_mj.evaluation.certification.certificates import load_certificates
+    from manipose_mj.evaluation.certification.search import chosen_starts, verify
+    from manipose_mj.evaluation.protocol.frozen import load
+
+    protocol = load(version)
+    known = load_certificates(protocol, certificates)
+    starts = chosen_starts(protocol, tasks, episodes)
+    certified = [start for start in starts if start in known.solved]
+    broken = []
+    with output.Progress("certificates") as progress:
+        for done, (start, outcome) in enumerate(verify(version, known, certified, jobs), 1):
+            if isinstance(outcome, str):
+                broken.append((start, outcome))
+            progress.update(done, len(certified), f"{done - len(broken)} hold")
+    console = output.standard_output()
+    for (task, number), reason in sorted(broken):
+        console.print(f"{task} {number}: {reason}", soft_wrap=True)
+    console.print(
+        f"{len(certified) - len(broken)} of {len(certified)} certificates hold; of {len(starts)} starts, "
+        f"{sum(start in known.unsolved for start in starts)} are known as unsolved and "
+        f"{sum(start not in known.solved and start not in known.unsolved for start in starts)} untried",
+        soft_wrap=True,
+    )
+    return _EXIT_FAILED if broken else 0
+
+
+def certify_protocol(
+    version: Annotated[Positional[str], arg(metavar="VERSION", help_behavior_hint="")] = "v1",
+    /,
+    *,
+    out: Annotated[Path, arg(metavar="FILE", help_behavior_hint="")],
+    tasks: Annotated[tuple[str, ...], arg(metavar="TASK...", help_behavior_hint="")] = (),
+    episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
+    again: Annotated[bool, arg(help_behavior_hint="")] = False,
+    jobs: int = CORES,
+) -> int:
+    """Find the certificates that are missing: a planner's seed and a number of plans that solve a start.
+
+    The file is written anew after every start; an interrupted search goes on from it.
+
+    Args:
+      version: Of the protocol.
+      out: File of certificates, new or to be completed.
+      tasks: Only these; by default all.
+      episodes: Only the first so many of each task; by default all.
+      again: Try starts that were not solved once more.
+      jobs: Episodes at the same time, one core each.
+    """
+    one_thread_per_process()
+    from manipose_mj.console import output
+    from manipose_mj.evaluation.certification.certificates import (
+        load_certificates,
+        save_certificates,
+    )
+    from manipose_mj.evaluation.certification.search import certify, chosen_starts
+    from manipose_mj.evaluation.protocol.frozen import load
+
+    if not out.parent.is_dir():
+        raise InputError(f"{out.parent}: no such folder")
+    protocol = load(version)
+    known = load_certificates(protocol, out)
+    settled = set(known.solved) if again else {*known.solved, *known.unsolved}
+    missing = [each for each in chosen_starts(protocol, tasks, episodes) if each not in settled]
+    with output.Progress("starts") as progress:
+        for done, (start, outcome) in enumerate(certify(version, missing, jobs), 1):
+            known = known.with_outcome(start, outcome)
+            save_certificates(known, out)
+            progress.update(done, len(missing), f"{len(known.solved)} certified")
+    console = output.standard_output()
+    for (task, number), reason in sorted(known.unsolved.items()):
+        console.print(f"{task} {number}: {reason}", soft_wrap=True)
+    console.print(f"{out}: {len(known.solved)} certified, {len(known.unsolved)} unsolved")
+    return 0

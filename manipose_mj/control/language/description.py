@@ -1,0 +1,67 @@
+"""What a language model is told: the rules of plans, the scene in words and numbers, and what is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from manipose_mj.control.language.destinations import Destination
+from manipose_mj.control.planning.check import PlanState
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
+
+RULES = """\
+You plan for one robot arm with a parallel gripper. Answer with JSON only: {"plan": [...], "refusal": ""}.
+Steps of a plan:
+- {"primitive": "grasp_at", "subject": NAME}: the empty hand takes hold of an object, or of a part by its handle.
+- {"primitive": "move_to", "subject": NAME, "destination": PLACE}: the object in the hand is brought to a place of the list.
+- {"primitive": "move_to", "subject": PART, "opening": NUMBER}: the part in the hand is moved until its joint is at NUMBER; \
+with an empty hand the part is pushed, which is enough to shut it.
+- {"primitive": "release", "subject": NAME}: the hand lets go.
+Rules:
+- The hand holds one thing at a time, and is empty at the end.
+- Open a drawer or door, and let go of its handle, before you put something inside or take something out. Open it nearly all the way.
+- Shut a part again only if that is asked for.
+- Use names, places and openings of the scene only.
+- When the instruction cannot be carried out in this scene, or fits several things of it equally well, answer with an empty plan \
+and say why in "refusal". When everything is as asked for already, answer with an empty plan and an empty refusal.\
+"""
+
+
+def scene_text(estimate: SceneEstimate, destinations: Mapping[str, Destination]) -> str:
+    """The scene in lines: objects, parts and places, in the world's frame, z up [m, rad]."""
+    lines = ["Objects:"]
+    state = PlanState(estimate)
+    lines += [_object_line(obj, state) for obj in estimate.objects.values()] or ["- none"]
+    lines.append("Parts:")
+    lines += [_part_line(part) for part in estimate.parts.values()] or ["- none"]
+    lines.append("Places:")
+    lines += [
+        f'- "{name}": {place.text}' + (f"; only for {place.only_for}" if place.only_for else "")
+        for name, place in destinations.items()
+    ]
+    return "\n".join(lines)
+
+
+def _object_line(obj: ObjectEstimate, state: PlanState) -> str:
+    x, y, z = (float(v) for v in obj.label_pose[:3, 3])
+    sizes = " x ".join(f"{float(v):.2f}" for v in obj.label.extents)
+    up = float(obj.label_pose[2, 0])
+    stands = "upright" if up > 0.9 else "upside down" if up < -0.9 else "lying"
+    around = state.part_around(obj.label_pose)
+    where = f"inside {around}" if around else "not in any part"
+    kind = f"a {obj.category.replace('_', ' ')}, " if obj.category else ""
+    graspable = "" if len(obj.grasps.poses) else ", too large for the gripper"
+    return f"- {obj.name}: {kind}{sizes} m, middle at ({x:.2f}, {y:.2f}, {z:.2f}), {stands}, {where}{graspable}"
+
+
+def _part_line(part: PartEstimate) -> str:
+    low, high = part.joint.range
+    kind, unit = ("drawer", "m") if part.joint.kind == "slide" else ("door", "rad")
+    x, y, z = (float(v) for v in part.handle_pose[:3, 3])
+    room = "encloses nothing"
+    if part.cavity is not None:
+        sizes = " x ".join(f"{float(v):.2f}" for v in part.cavity.extents)
+        room = f"closes a room of {sizes} m"
+    return (
+        f"- {part.name}: {kind}, its joint is at {part.opening:.3f} {unit}, shut at {low:.3f}, wide open at {high:.3f}; "
+        f"handle at ({x:.2f}, {y:.2f}, {z:.2f}); {room}"
+    )

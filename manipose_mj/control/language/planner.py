@@ -1,0 +1,151 @@
+"""The planner that asks a language model, with a bounded number of repairs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from manipose_mj.control.language.description import RULES, scene_text
+from manipose_mj.control.language.destinations import Destination, named_destinations
+from manipose_mj.control.language.exchanges import (
+    ChatModel,
+    Exchange,
+    Message,
+    NoReplyError,
+    append_exchange,
+)
+from manipose_mj.control.language.reply import (
+    RefusedError,
+    read_reply,
+    reply_schema,
+    resolved_plans,
+)
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.plan import CandidatePlan, Step
+from manipose_mj.control.planning.set_aside import places_aside
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.goals import Goal
+
+MAX_REPAIRS = 2
+
+
+class LanguagePlanner:
+    """Asks for a plan, has its mistakes put right, and resolves its places.
+
+    What a model may do is the same as for any planner: the reply is data of a schema, and is checked before
+    anything moves.
+    """
+
+    def __init__(
+        self, model: ChatModel, instruction: str | None = None, record: Path | None = None
+    ) -> None:
+        """Plans by this model.
+
+        Args:
+          model: What is asked.
+          instruction: What to do instead of what the episode asks for.
+          record: File that every exchange is added to.
+        """
+        self._model, self._instruction, self._record = model, instruction, record
+        self._asked_for = instruction or ""
+
+    def begin(self, instruction: str) -> None:
+        """An episode begins, which asks for this in words."""
+        self._asked_for = self._instruction or instruction
+
+    def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
+        """A model plans to the end."""
+        return False
+
+    def candidates(
+        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+    ) -> Iterator[CandidatePlan]:
+        """Plans that do what the model says, the straight one first.
+
+        Args:
+          goals: Of the task.
+          estimate: What is where.
+          planner: Of motions in the scene of `estimate`.
+
+        Raises:
+          InputError: The model does not answer, declines, or its last repair is still wrong.
+        """
+
+        def free(obj):
+            return places_aside(obj, (), estimate, planner)
+
+        destinations = named_destinations(goals, estimate, free)
+        messages = self.question(scene_text(estimate, destinations))
+        schema = reply_schema(estimate, destinations)
+        steps = self.steps(messages, schema, estimate, destinations)
+        for plan in resolved_plans(steps, estimate, planner):
+            yield CandidatePlan(lambda plan=plan: plan)
+
+    def steps(
+        self,
+        messages: list[Message],
+        schema: dict[str, Any],
+        estimate: SceneEstimate,
+        destinations: Mapping[str, Destination],
+    ) -> tuple[Step | NamedMove, ...]:
+        """The steps of the model's answer, after as many repairs as it needs and may have.
+
+        Args:
+          messages: The question.
+          schema: Of the answer.
+          estimate: What is where.
+          destinations: Places by name.
+
+        Raises:
+          InputError: The model does not answer, declines, or its last repair is still wrong.
+        """
+        mistake = ""
+        for _ in range(1 + MAX_REPAIRS):
+            reply = self._ask(messages, schema)
+            try:
+                return read_reply(reply, estimate, destinations)
+            except RefusedError as refusal:
+                raise InputError(f"the language model declines: {refusal}") from None
+            except InputError as error:
+                mistake = str(error)
+            messages = [
+                *messages,
+                {"role": "assistant", "content": reply},
+                {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
+            ]
+        raise InputError(
+            f"the language model's plan is still wrong after {MAX_REPAIRS} repairs: {mistake}"
+        )
+
+    def question(self, scene: str) -> list[Message]:
+        """The conversation that opens an exchange."""
+        return [
+            {"role": "system", "content": RULES},
+            {"role": "user", "content": f"{scene}\n\nInstruction: {self._asked_for}"},
+        ]
+
+    def _ask(self, messages: list[Message], schema: dict[str, Any]) -> str:
+        started, reply, error = time.perf_counter(), "", ""
+        try:
+            reply = self._model.answer(messages, schema)
+        except NoReplyError as failure:
+            error = str(failure)
+        if self._record is not None:
+            append_exchange(
+                self._record,
+                Exchange(
+                    self._model.name,
+                    self._model.parameters,
+                    messages,
+                    schema,
+                    reply,
+                    error,
+                    round(time.perf_counter() - started, 3),
+                ),
+            )
+        if error:
+            raise InputError(f"the language model gives no plan: {error}")
+        return reply

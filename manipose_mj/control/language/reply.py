@@ -1,0 +1,162 @@
+"""A language model's reply, read and resolved into a plan; nothing in it is executed as code."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from manipose_mj.control.language.destinations import Destination
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.check import PlanState
+from manipose_mj.control.planning.plan import Plan, Step, plan_from_json, plan_schema
+from manipose_mj.control.planning.regrasp import Poses, routes
+from manipose_mj.control.planning.transport import place_at_each
+from manipose_mj.control.scene.articulation import with_part_at
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.errors import InputError
+
+
+class RefusedError(Exception):
+    """The model answered that the instruction cannot be carried out, or is not clear; the text says why."""
+
+
+@dataclass(frozen=True)
+class NamedMove:
+    """`move_to` with the place it named; `step` holds the poses that are meant."""
+
+    step: Step
+    destination: str
+
+
+def reply_schema(
+    estimate: SceneEstimate, destinations: Mapping[str, Destination]
+) -> dict[str, Any]:
+    """The JSON schema of a reply: a plan whose moves name their places, or a refusal.
+
+    Args:
+      estimate: Whose names the plan may use.
+      destinations: Places by name.
+    """
+    plan = plan_schema({*estimate.objects, *estimate.parts})
+    plan.pop("$schema")
+    variants = plan["items"]["anyOf"]
+    for variant in variants:
+        fields = variant["properties"]
+        if "poses" in fields:
+            del fields["poses"]
+            fields["destination"] = {"type": "string", "enum": sorted(destinations)}
+            variant["required"] = list(fields)
+    return {
+        "type": "object",
+        "properties": {"plan": plan, "refusal": {"type": "string"}},
+        "required": ["plan", "refusal"],
+        "additionalProperties": False,
+    }
+
+
+def read_reply(
+    text: str, estimate: SceneEstimate, destinations: Mapping[str, Destination]
+) -> tuple[Step | NamedMove, ...]:
+    """The steps of a reply, checked in order.
+
+    Raises:
+      RefusedError: The model declines.
+      InputError: The reply is not of the schema, names something that is not there, or its steps do not find
+        what they need; one line.
+    """
+    try:
+        reply = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"reply: not valid JSON ({error})") from None
+    if not isinstance(reply, dict) or set(reply) != {"plan", "refusal"}:
+        raise InputError('reply: expected an object with the fields "plan" and "refusal"')
+    entries, refusal = reply["plan"], reply["refusal"]
+    if not isinstance(entries, list) or not isinstance(refusal, str):
+        raise InputError('reply: "plan" is a list of steps, "refusal" is text')
+    if refusal:
+        if entries:
+            raise InputError("reply: a plan and a refusal; expected one of them")
+        raise RefusedError(" ".join(refusal.split()))
+    state = PlanState(estimate)
+    steps = tuple(
+        _step(entry, f"plan[{i}]", estimate, destinations, state) for i, entry in enumerate(entries)
+    )
+    if state.held is not None:
+        raise InputError(f"plan: it ends with {state.held} in the hand; release it")
+    return steps
+
+
+def _step(
+    entry: Any,
+    where: str,
+    estimate: SceneEstimate,
+    destinations: Mapping[str, Destination],
+    state: PlanState,
+) -> Step | NamedMove:
+    if not isinstance(entry, dict) or "destination" not in entry:
+        subjects = {*estimate.objects, *estimate.parts}
+        try:
+            (step,) = plan_from_json(json.dumps([entry]), subjects)
+        except InputError as error:
+            raise InputError(str(error).replace("plan[0]", where)) from None
+        state.carry_out(step, where)
+        return step
+    if set(entry) != {"primitive", "subject", "destination"} or entry["primitive"] != "move_to":
+        raise InputError(f"{where}: only move_to has a 'destination', and nothing else beside it")
+    subject, name = entry["subject"], entry["destination"]
+    if subject not in estimate.objects:
+        known = ", ".join(sorted(estimate.objects)) or "none, the scene has no objects"
+        raise InputError(f"{where}: field 'subject' is {subject!r}; expected an object: {known}")
+    place = destinations.get(name) if isinstance(name, str) else None
+    if place is None:
+        raise InputError(
+            f"{where}: field 'destination' is {name!r}; expected one of {', '.join(sorted(destinations))}"
+        )
+    if place.only_for not in (None, subject):
+        raise InputError(f"{where}: {name!r} is for {place.only_for}, not for {subject}")
+    if state.held != subject:
+        raise InputError(f"{where}: move_to {subject}: the hand does not hold it; grasp it before")
+    poses = place.poses(state.as_estimate().objects[subject], state)
+    if not poses:
+        raise InputError(f"{where}: {subject} does not fit {name!r} in any orientation")
+    step = Step("move_to", subject, poses=poses)
+    state.carry_out(step, where)
+    return NamedMove(step, name)
+
+
+def resolved_plans(
+    steps: tuple[Step | NamedMove, ...], estimate: SceneEstimate, planner: MotionPlanner
+) -> Iterator[Plan]:
+    """Plans that do what the steps say: the likeliest first, then those that set an object down on the way.
+
+    The hand may have to take an object anew to turn it over: a grasp, move and release of an object become as many as
+    it needs.
+
+    Args:
+      steps: Of a reply.
+      estimate: What is where.
+      planner: Of motions in the scene of `estimate`.
+    """
+    straight = tuple(step.step if isinstance(step, NamedMove) else step for step in steps)
+    yield straight
+    moves = [i for i, step in enumerate(steps) if isinstance(step, NamedMove)]
+    if len(moves) != 1 or not 0 < moves[0] < len(steps) - 1:
+        return
+    at = moves[0]
+    name, poses = straight[at].subject, straight[at].poses
+    for stops in _stops(straight[: at - 1], name, poses, estimate, planner):
+        if len(stops) > 1:
+            yield straight[: at - 1] + place_at_each(name, stops) + straight[at + 2 :]
+
+
+def _stops(
+    before: Plan, name: str, poses: Poses, estimate: SceneEstimate, planner: MotionPlanner
+) -> Iterator[tuple[Poses, ...]]:
+    """Where the object may be set down on the way, with the parts open that are open by then."""
+    scene = planner.scene
+    for step in before:
+        if step.primitive == "move_to" and step.opening is not None:
+            scene = with_part_at(scene, estimate.parts[step.subject], step.opening)
+    yield from routes(planner.within(scene), estimate, estimate.objects[name], poses)

@@ -1,0 +1,64 @@
+"""Recordings as a policy: `--policy manipose_mj.demos.playback:RecordedPolicy --policy-args '{"data": "DIR"}'`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.demos.layout import RECORDED_HZ, DemoEpisode, DemoSet, find_sets, read_actions
+from manipose_mj.errors import InputError
+from manipose_mj.policies.protocol import ActionSpace
+
+
+class RecordedPolicy:
+    """Answers with the recorded actions of the episode's seed, all at once."""
+
+    def __init__(self, data: str) -> None:
+        """Reads the descriptions of the recordings in a folder, or of one file.
+
+        Raises:
+          InputError: There are none, or one is broken.
+        """
+        self._episodes: dict[tuple[str, int], tuple[DemoSet, DemoEpisode]] = {}
+        for demos in find_sets(Path(data)):
+            for episode in demos.episodes:
+                self._episodes[demos.task, episode.episode_seed] = demos, episode
+        self._actions = np.zeros((0, 8))
+
+    def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
+        """Look the episode up.
+
+        Raises:
+          InputError: It was not recorded, or in another control mode.
+        """
+        if (task, seed) not in self._episodes:
+            raise InputError(
+                f"no recording of {task} with seed {seed}; record with the same --seed"
+            )
+        demos, episode = self._episodes[task, seed]
+        if episode.control_mode != action_space.control_mode:
+            raise InputError(
+                f"{demos.path}: its actions are {episode.control_mode}; "
+                f"add --control-mode {episode.control_mode}"
+            )
+        self._actions = slowed(read_actions(demos, episode), action_space.hz)
+
+    def infer(self, obs: Mapping[str, Any]) -> dict[str, Any]:
+        """All actions."""
+        return {"actions": self._actions, "done": True}
+
+
+def slowed(actions: Float[np.ndarray, "t n"], hz: float) -> Float[np.ndarray, "s n"]:
+    """Every so-manieth target: of each period the last, where the arm shall be at its end.
+
+    Args:
+      actions: At the rate of recordings.
+      hz: At which targets shall follow each other.
+    """
+    count = int(np.ceil(len(actions) * hz / RECORDED_HZ))
+    ends = np.round((1 + np.arange(count)) * RECORDED_HZ / hz).astype(int) - 1
+    return actions[np.clip(ends, 0, len(actions) - 1)]

@@ -1,0 +1,100 @@
+"""An estimator behind checks: asked for one object at a time, wherever it runs."""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.answer import EstimatorFailedError, checked_answer
+from manipose_mj.estimators.observation import Observation
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
+from manipose_mj.wire.client import Client, RemoteFailureError
+
+
+class Estimator(Protocol):
+    """What a factory makes."""
+
+    def estimate(self, observation: Observation, /) -> Mapping[str, Any] | PoseEstimate:
+        """The pose of the object; keys are those of `observation` and `answer`."""
+        ...
+
+
+class RemoteEstimator:
+    """An estimator on a server: an observation is sent as it is, the answer comes back as it is.
+
+    Attributes:
+      address: Such as `ws://localhost:8000`.
+      metadata: What the server said of itself.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Connects.
+
+        Raises:
+          InputError: Nobody answers there.
+        """
+        self.address = address
+        self._client: Client | None = Client(address)
+        self.metadata = self._client.metadata
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        """Hangs up; the next question connects again."""
+        if self._client is not None:
+            self._client.close()
+        self._client = None
+
+    def estimate(self, observation: Observation, /) -> Mapping[str, Any]:
+        """The server's answer; connects again after the server has failed on a question.
+
+        Raises:
+          ServerLostError: It is there no more.
+          EstimatorFailedError: It failed on this question.
+        """
+        if self._client is None:
+            try:
+                self._client = Client(self.address)
+            except InputError as error:
+                raise ServerLostError(str(error)) from None
+        try:
+            return self._client.ask(observation)
+        except RemoteFailureError as error:
+            self.close()
+            raise EstimatorFailedError(str(error)) from None
+
+
+class EstimatorService:
+    """Somebody's estimator, whose mistakes are told from ours.
+
+    Attributes:
+      name: As it was asked for.
+      estimator: It.
+    """
+
+    def __init__(self, name: str, estimator: Estimator) -> None:
+        self.name, self.estimator = name, estimator
+
+    def close(self) -> None:
+        """Hangs up, where the estimator is on a server."""
+        if isinstance(self.estimator, RemoteEstimator):
+            self.estimator.close()
+
+    def estimate(self, observation: Observation) -> PoseEstimate:
+        """The checked answer to an observation.
+
+        Raises:
+          EstimatorFailedError: It raised an error or gave no pose; the message names it.
+          ServerLostError: Its server is there no more.
+        """
+        try:
+            answer = self.estimator.estimate(observation)
+            return checked_answer(answer, observation.get("mesh"))
+        except (ServerLostError, MemoryError):
+            raise
+        except EstimatorFailedError as error:
+            raise EstimatorFailedError(f"estimator {self.name}: {error}") from None
+        except Exception as error:  # whatever a stranger's code raises
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+            raise EstimatorFailedError(f"estimator {self.name} raised {reason}") from error

@@ -1,0 +1,83 @@
+"""Which estimator an evaluation asks, and what it may know."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from manipose_mj.errors import InputError
+from manipose_mj.wire.client import is_address
+
+
+@dataclass(frozen=True)
+class EstimatorSettings:
+    """An estimator by name.
+
+    Attributes:
+      name: `package.module:factory` or `ws://host:port`.
+      arguments: Keyword arguments of the factory, a JSON object; None: none.
+      give_cad: Whether observations hold the mesh of the very object that is seen.
+
+    Raises:
+      InputError: The arguments are no JSON object, or are given to a server.
+    """
+
+    name: str
+    arguments: str | None = None
+    give_cad: bool = False
+
+    def __post_init__(self) -> None:
+        if self.arguments is None:
+            return
+        if is_address(self.name):
+            raise InputError(
+                f"--estimator {self.name}: a server takes no --estimator-args; give them to it"
+            )
+        if not isinstance(self._parsed(), dict):
+            raise InputError(f"--estimator-args {self.arguments}: expected a JSON object")
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """The factory's arguments."""
+        return {} if self.arguments is None else self._parsed()
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What two runs must share for their results to belong together; reports show it."""
+        return {"name": self.name, "arguments": self.keywords, "given CAD": self.give_cad}
+
+    @property
+    def source(self) -> str:
+        """Where poses come from, for people."""
+        return f"estimated by {self.name}" + (", given CAD" if self.give_cad else "")
+
+    @property
+    def words(self) -> list[str]:
+        """Its options on the command line."""
+        words = ["--estimator", self.name]
+        if self.arguments is not None:
+            words += ["--estimator-args", self.arguments]
+        return [*words, "--give-cad"] if self.give_cad else words
+
+    def _parsed(self) -> Any:
+        try:
+            return json.loads(self.arguments or "{}")
+        except ValueError as error:
+            raise InputError(f"--estimator-args {self.arguments}: no JSON ({error})") from None
+
+
+def chosen_estimator(
+    name: str | None, arguments: str | None, give_cad: bool
+) -> EstimatorSettings | None:
+    """The settings that options of the command line mean; None where no estimator is named.
+
+    Raises:
+      InputError: There are arguments without an estimator.
+    """
+    if name is not None:
+        return EstimatorSettings(name, arguments, give_cad)
+    if arguments is not None or give_cad:
+        option = "--give-cad" if give_cad else "--estimator-args"
+        raise InputError(f"{option} is for an estimator of yours; name it by --estimator")
+    return None

@@ -1,0 +1,71 @@
+"""A card for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+OWN_CODE = "this repository"
+
+
+def card_markdown(card: Mapping[str, Any]) -> str:
+    """The text of `card.md`."""
+    code = card["code_url"]
+    lines = [
+        f"# {card['name']}",
+        "",
+        f"- Code: {code if code == OWN_CODE else f'<{code}>'}",
+        f"- Training data: {card['training_data']}",
+        f"- Method: {method_text(card['method'])}",
+    ]
+    for run in card["runs"]:
+        lines += ["", *_run_lines(run)]
+    return "\n".join(lines) + "\n"
+
+
+def method_text(method: Mapping[str, Any]) -> str:
+    """Who acted and what was told truly, in a line."""
+    policy = method.get("policy")
+    if policy:
+        name = policy.get("name", "?") if isinstance(policy, Mapping) else policy
+        seen = policy.get("obs_mode") if isinstance(policy, Mapping) else None
+        return f"policy `{name}`" + (f", observations `{seen}`" if seen else "")
+    if method.get("pose") != "estimated":
+        return "the baseline planner with true poses"
+    estimator = method.get("estimator")
+    if not estimator:
+        return "the baseline planner with poses estimated by the package's weights"
+    given = ", which was given the objects' meshes" if estimator.get("given CAD") else ""
+    return f"the baseline planner with poses estimated by `{estimator['name']}`{given}"
+
+
+def _run_lines(run: Mapping[str, Any]) -> list[str]:
+    seeds = "frozen seeds" if run["resample"] is None else f"seeds resampled from {run['resample']}"
+    versions = ", ".join(f"{name} {value}" for name, value in run["versions"].items())
+    rows = [
+        f"| `{task}` | {row['n']} | {row['success_at_end']} | {_interval(row['wilson_95'])} | "
+        f"{row['success_once']} | {_interval(row['wilson_95_once'])} | {_failures(row['failures'])} |"
+        for task, row in run["tasks"].items()
+    ]
+    return [
+        f"## Protocol {run['protocol']}, {seeds}",
+        "",
+        f"Mean over tasks: {run['mean_success_at_end']:.1%} at end, {run['mean_success_once']:.1%} once.",
+        "",
+        "| task | n | at end | Wilson 95 % | once | Wilson 95 % | failures |",
+        "| --- | ---: | ---: | --- | ---: | --- | --- |",
+        *rows,
+        "",
+        f"Protocol sha256 `{run['protocol_sha256'][:16]}`, results sha256 `{run['results_sha256'][:16]}`. "
+        f"{versions}; {run['machine']}.",
+        "",
+        f"    {run['command']}",
+    ]
+
+
+def _interval(bounds: list[float]) -> str:
+    return f"{100 * bounds[0]:.0f} - {100 * bounds[1]:.0f} %"
+
+
+def _failures(failures: Mapping[str, int]) -> str:
+    return ", ".join(f"{stage} {count}" for stage, count in failures.items()) or "none"

@@ -1,0 +1,112 @@
+"""The results of an evaluation on a protocol, held against its frozen seeds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.records import EpisodeResult, read_results
+from manipose_mj.evaluation.runner import RESULTS_FILE, RUN_FILE
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """A finished evaluation.
+
+    Attributes:
+      run: The content of its `run.json`.
+      results: Every episode, in the order of task and episode.
+      sha256: Of its `results.jsonl`.
+    """
+
+    run: dict[str, Any]
+    results: tuple[EpisodeResult, ...]
+    sha256: str
+
+
+def read_run(folder: Path) -> RunRecord:
+    """The evaluation in a folder, complete and on the seeds that its protocol fixes.
+
+    Raises:
+      InputError: A file is missing or broken, the run follows no protocol of this version, or an episode is
+        missing, superfluous, of another seed or about another object; one line says which.
+    """
+    run = _run_file(folder / RUN_FILE)
+    path = folder / RESULTS_FILE
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    content = path.read_bytes()
+    results, size = read_results(path)
+    if size < len(content):
+        raise InputError(f"{path}: line {len(results) + 1} is not an episode's whole result")
+    _check_episodes(path, _config(folder, run), results)
+    ordered = tuple(sorted(results, key=lambda result: result.key))
+    return RunRecord(run, ordered, hashlib.sha256(content).hexdigest())
+
+
+def _run_file(path: Path) -> dict[str, Any]:
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON ({error})") from None
+    if not isinstance(run, dict) or not run.get("protocol"):
+        raise InputError(
+            f"{path}: no run of a protocol; a card is of `manipose evaluate --protocol v1`"
+        )
+    frozen = protocol.load(run["protocol"])
+    if run.get("protocol sha256") != frozen.sha256:
+        raise InputError(
+            f"{path}: protocol {frozen.version} has sha256 {frozen.sha256[:12]}..., "
+            f"the run is of {str(run.get('protocol sha256'))[:12]}..."
+        )
+    return run
+
+
+def _config(folder: Path, run: dict[str, Any]) -> EvaluationConfig:
+    """What the run says it ran, as far as seeds depend on it."""
+    resampled = {} if run.get("resample") is None else {"resample": run["resample"]}
+    try:
+        return EvaluationConfig(
+            tasks=tuple(run["tasks"]),
+            out=folder,
+            episodes=run["episodes"],
+            protocol=run["protocol"],
+            **resampled,
+        )
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{folder / RUN_FILE}: cannot be read as a run ({error!r})") from None
+
+
+def _check_episodes(path: Path, config: EvaluationConfig, results: Sequence[EpisodeResult]) -> None:
+    """Every episode of the run is there, on its own seed and objects, and no other."""
+    found = {result.key: result for result in results}
+    assert config.protocol is not None
+    frozen = protocol.load(config.protocol)
+    for task in sorted(config.tasks):
+        for episode in range(config.episodes):
+            seed, result = config.episode_seed(task, episode), found.pop((task, episode), None)
+            if result is None:
+                raise InputError(f"{path}: episode {episode} of {task}, seed {seed}, is missing")
+            if result.seed != seed:
+                raise InputError(
+                    f"{path}: episode {episode} of {task} has seed {result.seed}; "
+                    f"protocol {config.protocol} has {seed}"
+                )
+            fixed = frozen.episode(task, episode)
+            of_seed = fixed.objects if seed == fixed.seed else None
+            if of_seed is not None and result.object and result.object not in of_seed:
+                raise InputError(
+                    f"{path}: episode {episode} of {task} is about {result.object}; protocol "
+                    f"{config.protocol} has {', '.join(of_seed)}"
+                )
+    for task, episode in found:
+        raise InputError(f"{path}: episode {episode} of {task} is not of this run")

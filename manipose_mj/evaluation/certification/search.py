@@ -1,0 +1,84 @@
+"""Finding and replaying the certificates of a protocol's starts: every start is one episode of the baseline."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+
+import joblib
+
+from manipose_mj.control.baseline import MAX_PLANS
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.certification.certificates import Certificate, Certificates, Key
+from manipose_mj.evaluation.episode import run_episode
+from manipose_mj.evaluation.protocol.frozen import Protocol, load
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+
+ATTEMPTS = 2
+
+
+def attempts(seed: int) -> tuple[Certificate, ...]:
+    """What is tried in turn for an episode's seed: first what an evaluation does, then other samples."""
+    return tuple(Certificate((seed + i) % 2**32, MAX_PLANS) for i in range(ATTEMPTS))
+
+
+def chosen_starts(
+    protocol: Protocol, tasks: Sequence[str] = (), episodes: int | None = None
+) -> list[Key]:
+    """The starts of some tasks, or of all; the first `episodes` of each, or all.
+
+    Raises:
+      InputError: The protocol lacks a task, or has no such number of episodes.
+    """
+    keys = []
+    for task in tasks or sorted(protocol.tasks):
+        most = len(protocol.task(task).episodes)
+        count = most if episodes is None else episodes
+        if not 1 <= count <= most:
+            raise InputError(f"episodes is {count}; expected 1 to {most}")
+        keys += [(task, i) for i in range(count)]
+    return keys
+
+
+def certify(
+    version: str, starts: Sequence[Key], jobs: int
+) -> Iterator[tuple[Key, Certificate | str]]:
+    """Look for certificates; each as it is found, or the reason why the last attempt failed."""
+    yield from _in_parallel(((version, start, None) for start in starts), jobs)
+
+
+def verify(
+    version: str, known: Certificates, starts: Sequence[Key], jobs: int
+) -> Iterator[tuple[Key, Certificate | str]]:
+    """Replay certificates; each that still solves its start, or the reason why it does not."""
+    yield from _in_parallel(((version, start, known.solved[start]) for start in starts), jobs)
+
+
+def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate | str]]:
+    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+        pool = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+        yield from pool(joblib.delayed(_outcome)(*start) for start in starts)
+
+
+def _outcome(
+    version: str, start: Key, certificate: Certificate | None
+) -> tuple[Key, Certificate | str]:
+    """Play a start by a certificate; without one, look for one."""
+    # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
+    logging.getLogger("absl").setLevel(logging.ERROR)
+    task, number = start
+    frozen = load(version).episode(task, number)
+    config = EnvConfig(task, obs_mode="state", split="test")
+    reason = ""
+    for attempt in attempts(frozen.seed) if certificate is None else (certificate,):
+        result, _ = run_episode(
+            config,
+            EpisodeSpec(**frozen.asked),
+            episode=number,
+            planner_seed=attempt.planner_seed,
+            plans=attempt.plans,
+        )
+        if result.success_at_end:
+            return start, attempt
+        reason = f"{result.failure}: {result.reason}"
+    return start, reason

@@ -1,0 +1,104 @@
+"""Which planner makes the baseline's plans, as data that processes can be sent."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from manipose_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from manipose_mj.control.planning.planner import TaskPlanner
+
+PlannerKind = Literal["rules", "llm", "replay"]
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """A planner.
+
+    Attributes:
+      kind: `"rules"`: the symbolic planner; `"llm"`: a language model; `"replay"`: one's recorded answers.
+      model: Name of the language model.
+      base_url: Of its endpoint; by default OpenAI's.
+      replay: File or folder of recorded exchanges.
+      instruction: What a language model shall do instead of the task's goals.
+      record: Folder for exchanges; a file a process.
+
+    Raises:
+      InputError: Something is missing, or does not belong to this kind.
+    """
+
+    kind: PlannerKind = "rules"
+    model: str | None = None
+    base_url: str | None = None
+    replay: Path | None = None
+    instruction: str | None = None
+    record: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind == "rules" and self.instruction is not None:
+            raise InputError("instruction: the planner by rules reads none; choose --planner llm")
+        if (self.kind == "llm") != (self.model is not None):
+            raise InputError("model: --planner llm needs one, and no other planner takes one")
+        if (self.kind == "replay") != (self.replay is not None):
+            raise InputError(
+                "replay: --planner replay needs a file, and no other planner takes one"
+            )
+        if self.kind != "llm" and self.base_url is not None:
+            raise InputError("base url: only --planner llm has an endpoint")
+        if self.replay is not None and not self.replay.exists():
+            raise InputError(f"{self.replay}: no such file or folder of recorded exchanges")
+
+    def make(self) -> TaskPlanner:
+        """The planner.
+
+        Raises:
+          InputError: The endpoint's client or key is missing, or the recorded answers cannot be read.
+        """
+        # Loads the simulator: workers only.
+        from manipose_mj.control.language.endpoint import EndpointModel
+        from manipose_mj.control.language.exchanges import ReplayModel
+        from manipose_mj.control.language.planner import LanguagePlanner
+        from manipose_mj.control.planning.planner import RulePlanner
+
+        if self.kind == "rules":
+            return RulePlanner()
+        if self.replay is not None:
+            return LanguagePlanner(ReplayModel(self.replay), self.instruction)
+        assert self.model is not None
+        record = None if self.record is None else self.record / f"{os.getpid()}.jsonl"
+        return LanguagePlanner(EndpointModel(self.model, self.base_url), self.instruction, record)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What two runs must share for their results to belong together; JSON, without keys."""
+        given: dict[str, Any] = {"kind": self.kind}
+        if self.model is not None:
+            given["model"] = self.model
+        if self.instruction is not None:
+            given["instruction"] = self.instruction
+        if self.replay is not None:
+            files = sorted(self.replay.glob("*.jsonl")) if self.replay.is_dir() else [self.replay]
+            text = b"".join(file.read_bytes() for file in files)
+            given["replay sha256"] = hashlib.sha256(text).hexdigest()
+        return given
+
+    @property
+    def words(self) -> list[str]:
+        """The options of the command line that say the same."""
+        if self.kind == "rules":
+            return []
+        words = ["--planner", self.kind]
+        for name, value in (
+            ("--model", self.model),
+            ("--base-url", self.base_url),
+            ("--replay", self.replay),
+            ("--instruction", self.instruction),
+        ):
+            if value is not None:
+                words += [name, str(value)]
+        return words

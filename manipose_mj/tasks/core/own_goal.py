@@ -1,0 +1,56 @@
+"""Starts with a goal of the user's in the place of the one that was drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.errors import InputError
+from manipose_mj.poses import compose
+from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.goals import OrientationGoal, PoseGoal
+
+_MARKERS = "goal", "goal_object"
+_ORTHONORMAL = 1e-4
+
+
+def with_goal(start: EpisodeStart, pose: Float[np.ndarray, "4 4"]) -> EpisodeStart:
+    """The start with another goal pose of the object that the episode is about, and its marker there.
+
+    Args:
+      start: As it was drawn.
+      pose: `T_world_label`; of it, a goal that is an orientation takes the rotation.
+
+    Raises:
+      InputError: The task asks for no pose, or this is none.
+    """
+    check_pose(pose)
+    goals, marked = list(start.goals), pose
+    for index, goal in enumerate(goals):
+        if isinstance(goal, PoseGoal):
+            goals[index] = replace(goal, pose=pose)
+            break
+        if isinstance(goal, OrientationGoal):
+            goals[index] = replace(goal, rotation=pose[:3, :3])
+            shown = start.fixtures.get("goal")
+            marked = pose if shown is None else compose(pose[:3, :3], shown[:3, 3])
+            break
+    else:
+        kinds = ", ".join(goal.kind for goal in goals) or "none"
+        raise InputError(f"a goal pose is given, but this task's goals are of other kinds: {kinds}")
+    fixtures = {n: marked if n in _MARKERS else p for n, p in start.fixtures.items()}
+    return replace(start, goals=tuple(goals), fixtures=fixtures)
+
+
+def check_pose(pose: np.ndarray) -> None:
+    """Raise `InputError` where an array is no rigid transform."""
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        raise InputError(
+            f"goal has shape {pose.shape}; expected a finite (4, 4) pose T_world_label"
+        )
+    rotation = pose[:3, :3]
+    skew = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if skew > _ORTHONORMAL or np.linalg.det(rotation) < 0 or np.any(pose[3] != (0, 0, 0, 1)):
+        raise InputError("goal is no rigid transform: its rotation is not orthonormal")

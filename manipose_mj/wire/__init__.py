@@ -1,0 +1,1 @@
+"""Talking to methods that run in environments of their own: openpi's framing over websockets."""

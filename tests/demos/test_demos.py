@@ -1,0 +1,341 @@
+"""Demonstrations: recorded, resumed, replayed bit for bit, converted, exported; broken files are one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from manipose_mj.cli.main import main
+from manipose_mj.demos import record as recording
+from manipose_mj.demos.layout import find_sets, frozen_seeds, read_actions, read_set, refuse_frozen
+from manipose_mj.demos.lerobot_export import ExportConfig, export
+from manipose_mj.demos.playback import slowed
+from manipose_mj.demos.record import RecordConfig, record
+from manipose_mj.demos.replay import ReplayConfig, differing_versions, lost, replay
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
+from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.runner import evaluate
+from tests.places import ROOT
+
+TASK = "single_object/target_pose"
+OBJECTS = ("mug_000", "chips_can_000", "box_000")
+
+
+def config(out: Path, **options: Any) -> RecordConfig:
+    return RecordConfig(TASK, out, **{"episodes": 2, "objects": OBJECTS, **options})
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory):
+    return record(config(tmp_path_factory.mktemp("demos")))
+
+
+@pytest.fixture
+def copied(demos, tmp_path):
+    """The recordings in a folder that a test may damage."""
+    shutil.copytree(demos.path.parent, tmp_path / "copied")
+    return tmp_path / "copied" / demos.path.name
+
+
+def test_recordings_have_maniskills_layout(demos):
+    assert demos.path.name == "trajectory.none.pd_joint_pos.mujoco_cpu.h5"
+    assert len(demos.episodes) == 2 and all(each.success for each in demos.episodes)
+    document = json.loads(demos.path.with_suffix(".json").read_text())
+    assert document["env_info"]["env_id"] == "manipose_mj/TargetPose-v0"
+    assert {"versions", "protocol", "source_type"} <= document.keys()
+    with h5py.File(demos.path) as file:
+        for episode in document["episodes"]:
+            group = file[f"traj_{episode['episode_id']}"]
+            steps = episode["elapsed_steps"]
+            assert group["actions"].shape == (steps, 8)
+            assert group["env_states/qpos"].shape[0] == steps + 1
+            for name in ("terminated", "truncated", "success"):
+                assert group[name].shape == (steps,) and group[name].dtype == bool
+            assert group["success"][-1] and not group["terminated"][:].any()
+    assert demos.path.stat().st_size < 2 * 150e3
+    assert not (demos.path.parent / recording.PARTS).exists()
+
+
+def test_replays_are_bit_identical(demos):
+    results = replay(demos, ReplayConfig())
+    assert [each.identical for each in results] == [True, True] and lost(results) == 0
+    assert differing_versions(demos) == []
+    older = replace(demos, versions={**demos.versions, "numpy": "1.0"})
+    assert differing_versions(older)[0].startswith("numpy 1.0 -> ")
+
+
+@pytest.mark.full
+def test_a_replay_adds_observations_and_converts(demos, tmp_path):
+    asked = ReplayConfig("state+pose", "pd_ee_delta_pose", tmp_path)
+    results = replay(demos, asked)
+    (new,) = find_sets(tmp_path)
+    assert new.path.name == "trajectory.state+pose.pd_ee_delta_pose.mujoco_cpu.h5"
+    assert len(new.episodes) + lost(results) == 2 and new.episodes
+    episode = new.episodes[0]
+    with h5py.File(new.path) as file:
+        group = file[f"traj_{episode.episode_id}"]
+        assert group["actions"].shape == (episode.elapsed_steps, 7)
+        for name, width in (("agent_pos", 17), ("environment_state", 20)):
+            assert group[f"obs/{name}"].shape == (episode.elapsed_steps + 1, width)
+        assert (np.diff(group["obs/agent_pos"][:, 8:11], axis=0) != 0).any()
+    with pytest.raises(InputError, match="is there already"):
+        replay(demos, asked)
+    with pytest.raises(InputError, match="is a replay already"):
+        replay(new, replace(asked, out=tmp_path / "again"))
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("hz", [50.0, 10.0])
+def test_recorded_targets_succeed_as_a_policy(demos, hz, tmp_path):
+    settings = PolicySettings(
+        "manipose_mj.demos.playback:RecordedPolicy",
+        json.dumps({"data": str(demos.path)}),
+        hz=hz,
+        stop="horizon",
+    )
+    first = next(config(tmp_path).seeds())[1]
+    assert first == demos.episodes[0].episode_seed == episode_seed(1, TASK, 0)
+    results = evaluate(EvaluationConfig((TASK,), tmp_path, 1, 1, objects=OBJECTS, policy=settings))
+    assert results[0].success_at_end and results[0].clipped_actions == 0
+    assert results[0].decisions == 1
+    with pytest.raises(InputError, match="no recording of"):
+        evaluate(EvaluationConfig((TASK,), tmp_path / "b", 1, 2, objects=OBJECTS, policy=settings))
+
+
+def test_slow_targets_are_the_last_of_their_periods():
+    actions = np.arange(12.0)[:, None]
+    assert slowed(actions, 50.0)[:, 0].tolist() == list(range(12))
+    assert slowed(actions, 10.0)[:, 0].tolist() == [4, 9, 11]
+
+
+class _Writer:
+    """Takes what LeRobot's writer takes, and refuses what it refuses."""
+
+    def __init__(self, features):
+        self.features, self.frames, self.episodes, self.finalized = features, [], 0, False
+
+    def add_frame(self, frame):
+        assert frame.keys() == {*self.features, "task"} and frame["task"].endswith(".")
+        for name, feature in self.features.items():
+            assert frame[name].shape == tuple(feature["shape"])
+            assert frame[name].dtype == np.dtype(feature["dtype"])
+        self.frames.append(frame)
+
+    def save_episode(self):
+        self.episodes += 1
+
+    def finalize(self):
+        self.finalized = True
+
+
+@pytest.mark.full
+def test_an_export_replays_at_its_rate_and_writes_frames(demos, tmp_path):
+    opened = []
+
+    def open_writer(asked, features):
+        opened.append(_Writer(features))
+        return opened[0]
+
+    done = export([demos], ExportConfig(tmp_path / "set"), open_writer=open_writer)
+    (writer,) = opened
+    assert writer.finalized and writer.episodes == done.episodes == 2 and done.lost == 0
+    assert done.frames == len(writer.frames)
+    assert done.frames == sum(-(-each.elapsed_steps // 5) for each in demos.episodes)
+    actions = read_actions(demos, demos.episodes[0])
+    np.testing.assert_allclose(writer.frames[0]["action"], actions[4], rtol=1e-6)
+    assert list(writer.features) == [
+        "observation.state", "action", "observation.environment_state",
+    ]  # fmt: skip
+
+
+def test_an_export_without_lerobot_says_so(demos, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "lerobot", None)
+    with pytest.raises(InputError, match="needs LeRobot"):
+        export([demos], ExportConfig(tmp_path / "set"))
+    assert not (tmp_path / "set").exists()
+
+
+def _attempting(config, number, seed):
+    """Instead of an episode: every third attempt fails."""
+    stage = "grasp" if number % 3 == 1 else None
+    arrays = recording_arrays(np.full((number + 1, 8), float(number)))
+    write_attempt(config, number, seed, stage, arrays)
+    return stage is None
+
+
+def recording_arrays(actions):
+    from manipose_mj.demos.layout import DemoArrays
+
+    states = np.zeros((len(actions) + 1, 3), np.float32)
+    return DemoArrays(actions, states, states, np.ones(len(actions), bool), False, {})
+
+
+def write_attempt(config, number, seed, stage, arrays):
+    from manipose_mj.demos.attempts import attempt_file
+    from manipose_mj.demos.layout import write_episode, writing
+
+    path = attempt_file(config.parts, number)
+    if stage is None or config.failures:
+        with writing(path.with_suffix(".h5")) as file:
+            write_episode(file, number, arrays)
+    path.write_text(
+        json.dumps(
+            {
+                "episode_id": number,
+                "episode_seed": seed,
+                "control_mode": "pd_joint_pos",
+                "elapsed_steps": number + 1,
+                "success": stage is None,
+                "failure": stage,
+                "object": "mug_000",
+                "instruction": "Do it.",
+                "state_sha256": "",
+                "reset_kwargs": {"seed": seed},
+            }
+        )
+    )
+
+
+def test_the_first_successes_are_kept_whatever_was_interrupted(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    whole = record(config(tmp_path / "whole", episodes=5))
+    assert [each.elapsed_steps for each in whole.episodes] == [1, 3, 4, 6, 7]
+
+    def interrupted(config, number, seed):
+        if number == 3:
+            raise KeyboardInterrupt
+        return _attempting(config, number, seed)
+
+    monkeypatch.setattr(recording, "_attempt", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        record(config(tmp_path / "cut", episodes=5))
+    calls = []
+
+    def counted(config, number, seed):
+        calls.append(number)
+        return _attempting(config, number, seed)
+
+    monkeypatch.setattr(recording, "_attempt", counted)
+    with pytest.raises(InputError, match="add --resume"):
+        record(config(tmp_path / "cut", episodes=5))
+    with pytest.raises(InputError, match="its attempts have seed 1, this run has 2"):
+        record(config(tmp_path / "cut", episodes=5, seed=2), resume=True)
+    again = record(config(tmp_path / "cut", episodes=5), resume=True)
+    assert calls == [3, 4, 5, 6] and again.episodes == whole.episodes
+    assert record(config(tmp_path / "cut", episodes=5), resume=True).episodes == whole.episodes
+    with pytest.raises(InputError, match="holds 5 successes"):
+        record(config(tmp_path / "cut", episodes=6), resume=True)
+
+
+def test_failures_are_kept_with_their_stage_where_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    kept = record(config(tmp_path, episodes=3, failures=True))
+    assert [each.failure for each in kept.episodes] == [None, "grasp", None, None]
+
+
+def test_a_task_that_the_baseline_cannot_do_ends_with_one_line(tmp_path, monkeypatch):
+    def failing(config, number, seed):
+        write_attempt(config, number, seed, "plan", None)
+        return False
+
+    monkeypatch.setattr(recording, "_attempt", failing)
+    with pytest.raises(InputError, match="succeeded in 0 of 21 attempts|succeeded in 0 of 2"):
+        record(config(tmp_path))
+
+
+def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
+    frozen = frozen_seeds(TASK)
+    assert len(frozen) == 100
+    with pytest.raises(InputError, match="is an evaluation seed of a protocol"):
+        refuse_frozen(TASK, [5, min(frozen)])
+    first = next(config(tmp_path).seeds())
+    monkeypatch.setattr(recording, "frozen_seeds", lambda task: {first[1]})
+    assert next(config(tmp_path).seeds())[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "no whole HDF5 file"),
+        (lambda path: path.write_bytes(b"hello"), "no whole HDF5 file"),
+        (lambda path: path.unlink(), "no whole HDF5 file|holds no demonstrations"),
+        (lambda path: path.with_suffix(".json").unlink(), "no description of demonstrations"),
+        (lambda path: path.with_suffix(".json").write_text("{}"), "KeyError: 'env_info'"),
+        (lambda path: path.with_suffix(".json").write_text('{"env_'), "no description"),
+        (lambda path: _without(path, "traj_1"), "lacks traj_1"),
+        (lambda path: _without(path, "traj_0/actions"), "no whole HDF5 file"),
+    ],
+)
+def test_broken_files_are_one_line_and_exit_code_2(copied, damage, said, capsys):
+    damage(copied)
+    assert main(["demos", "replay", str(copied.parent), "--jobs", "1"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and re.search(said, lines[0])
+
+
+def _without(path: Path, name: str) -> None:
+    with h5py.File(path, "a") as file:
+        del file[name]
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (f"record {TASK}s --out {{tmp}}/out", "did you mean single_object/target_pose"),
+        ("record --out {tmp}/out", "no task given"),
+        (f"record {TASK} --out {{tmp}}/out --episodes 0", "episodes is 0"),
+        (f"record {TASK} --out {{tmp}}/out --objects mug_004", "mug_004 is a test object"),
+        ("replay {tmp}", "holds no demonstrations"),
+        ("replay {demos} --obs-mode state", "need --out"),
+        ("replay {demos} --out {tmp}/out", "nothing is new"),
+        ("replay {demos} --obs-mode poses --out {tmp}/out", "did you mean pose"),
+        ("replay {demos} --control-mode pd_ee --out {tmp}/out", "control mode 'pd_ee'"),
+        ("export {demos} --out {tmp}/out --hz 0", "hz is 0"),
+        ("export {demos} --out {tmp}/out --obs-mode pose", "expected state+pose"),
+        ("export {demos} --out {tmp}", "is there already"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(argv, said, demos, tmp_path, capsys):
+    words = argv.format(tmp=tmp_path, demos=demos.path.parent).split()
+    assert main(["demos", *words]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and said in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.full
+def test_a_kill_loses_the_running_episode_at_most(tmp_path):
+    words = ["demos", "record", TASK, "--episodes", "4", "--jobs", "1", "--objects", *OBJECTS]
+    command = [sys.executable, "-W", "ignore", "-m", "manipose_mj.cli.main", *words]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    out = tmp_path / "out"
+    process = subprocess.Popen([*command, "--out", str(out)], env=environment)
+    parts = config(out).parts
+    deadline = time.monotonic() + 120
+    while len(list(parts.glob("0*.json"))) < 2:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = {file.name: file.stat().st_mtime_ns for file in parts.glob("0*.json")}
+    assert len(kept) >= 2
+    asked = config(out, episodes=4)
+    resumed = record(asked, resume=True)
+    whole = record(config(tmp_path / "whole", episodes=4))
+    assert resumed.episodes == whole.episodes
+    assert read_set(resumed.path).episodes == whole.episodes
+    assert resumed.path.read_bytes() == whole.path.read_bytes()

@@ -1,0 +1,97 @@
+"""Certificates: found, kept whole, replayed, and refused where they are of something else."""
+
+from __future__ import annotations
+
+import pytest
+
+from manipose_mj.cli.main import main
+from manipose_mj.control.baseline import MAX_PLANS
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.certification.certificates import (
+    Certificate,
+    Certificates,
+    load_certificates,
+    save_certificates,
+)
+from manipose_mj.evaluation.certification.search import attempts, chosen_starts, verify
+from manipose_mj.failures import STAGES
+
+V1 = protocol.load("v1")
+SHIPPED = load_certificates(V1)
+TASK = "single_object/target_pose"
+# One certified start a task, at places spread over the file.
+SAMPLE = [
+    min((key for key in SHIPPED.solved if key[0] == task), key=lambda key: (key[1] * 37 + i) % 100)
+    for i, task in enumerate(sorted({task for task, _ in SHIPPED.solved}))
+]
+
+
+def test_the_file_comes_back_as_it_was_written(tmp_path):
+    known = Certificates(V1.sha256).with_outcome((TASK, 3), Certificate(7, 5))
+    known = known.with_outcome((TASK, 4), "plan: no grasp").with_outcome(
+        (TASK, 5), "grasp: it slipped"
+    )
+    known = known.with_outcome((TASK, 5), Certificate(9, 10))
+    save_certificates(known, tmp_path / "c.json")
+    again = load_certificates(V1, tmp_path / "c.json")
+    assert again == known
+    assert again.solved == {(TASK, 3): Certificate(7, 5), (TASK, 5): Certificate(9, 10)}
+    assert again.unsolved == {(TASK, 4): "plan: no grasp"}
+    assert load_certificates(V1, tmp_path / "none.json") == Certificates(V1.sha256)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "not a file of certificates"),
+        ('{"protocol": "1", "solved": {"a": 3}, "unsolved": {}}', "not a file of certificates"),
+        (
+            '{"protocol": "1", "solved": {}, "unsolved": {}}',
+            "of a protocol with sha256 1, not of v1",
+        ),
+    ],
+)
+def test_other_files_are_refused(tmp_path, content, message):
+    path = tmp_path / "c.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        load_certificates(V1, path)
+    assert "c.json" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_starts_are_chosen_by_task_and_number():
+    assert len(chosen_starts(V1)) == 100 * len(V1.tasks)
+    assert chosen_starts(V1, [TASK], 2) == [(TASK, 0), (TASK, 1)]
+    for wrong in (0, 101):
+        with pytest.raises(InputError, match=f"episodes is {wrong}; expected 1 to 100"):
+            chosen_starts(V1, [TASK], wrong)
+
+
+def test_the_first_attempt_is_what_an_evaluation_plays():
+    assert attempts(2**32 - 1)[0] == Certificate(2**32 - 1, MAX_PLANS)
+    assert attempts(2**32 - 1)[1].planner_seed == 0
+
+
+def test_shipped_certificates_are_of_starts_that_exist():
+    for task, number in (*SHIPPED.solved, *SHIPPED.unsolved):
+        V1.episode(task, number)
+    assert not SHIPPED.solved.keys() & SHIPPED.unsolved.keys()
+    assert all(reason.partition(":")[0] in STAGES for reason in SHIPPED.unsolved.values())
+    assert {task for task, _ in SHIPPED.solved} == set(V1.tasks)
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("start", SAMPLE, ids=lambda start: f"{start[0]}-{start[1]}")
+def test_a_shipped_certificate_solves_its_start(start):
+    assert list(verify("v1", SHIPPED, [start], jobs=1)) == [(start, SHIPPED.solved[start])]
+
+
+def test_commands_find_and_replay(tmp_path, capsys):
+    out = str(tmp_path / "c.json")
+    chosen = ["--tasks", TASK, "--episodes", "1", "--jobs", "1"]
+    assert main(["protocol", "certify", "--out", out, *chosen]) == 0
+    assert "1 certified, 0 unsolved" in capsys.readouterr().out
+    assert main(["protocol", "verify", "--certificates", out, *chosen]) == 0
+    assert "1 of 1 certificates hold; of 1 starts" in capsys.readouterr().out
+    assert main(["protocol", "certify", "--out", str(tmp_path / "no" / "c.json"), *chosen]) == 2

@@ -1,0 +1,84 @@
+"""An evaluation with somebody's estimator: what its results belong to, and what a lost server leaves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import tests.evaluation.fake_episodes as fake
+from manipose_mj.cli.main import main
+from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.settings import EstimatorSettings
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.records import read_results
+from manipose_mj.evaluation.runner import evaluate
+
+TASK = "single_object/target_pose"
+MIDDLE = EstimatorSettings("tests.estimators.answers:Middle", '{"score": 0.5}', give_cad=True)
+
+
+def config(out: Path, estimator: EstimatorSettings | None = MIDDLE) -> EvaluationConfig:
+    return EvaluationConfig(
+        (TASK,), out, episodes=4, pose="estimated" if estimator else "oracle", estimator=estimator
+    )
+
+
+def test_results_say_whose_estimates_they_are_of(tmp_path):
+    evaluate(config(tmp_path), runner=fake.make_runner())
+    told = {"name": MIDDLE.name, "arguments": {"score": 0.5}, "given CAD": True}
+    run, summary = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("run", "summary"))
+    assert run["estimator"] == summary["estimator"] == told
+    assert summary["poses"]["objects"] == f"estimated by {MIDDLE.name}, given CAD"
+    assert "--give-cad" in run["command"] and "--estimator-args" in run["command"]
+    with pytest.raises(InputError, match="its results have estimator"):
+        evaluate(
+            config(tmp_path, EstimatorSettings(MIDDLE.name)), resume=True, runner=fake.make_runner()
+        )
+
+
+def test_a_server_lost_in_the_middle_is_no_failed_episode_and_can_be_resumed(tmp_path):
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    evaluate(config(whole), runner=fake.make_runner())
+
+    def lost_at_2(config, spec, *, episode, pose):
+        if episode == 2:
+            raise ServerLostError("ws://there: connection lost")
+        return fake.make_runner()(config, spec, episode=episode, pose=pose)
+
+    with pytest.raises(ServerLostError):
+        evaluate(config(broken), runner=lost_at_2)
+    assert len(read_results(broken / "results.jsonl")[0]) == 2
+    evaluate(config(broken), resume=True, runner=fake.make_runner())
+
+    def timeless(folder):
+        lines = map(json.loads, (folder / "results.jsonl").read_text().splitlines())
+        return [{k: v for k, v in line.items() if k != "wall_s"} for line in lines]
+
+    assert timeless(broken) == timeless(whole)
+
+
+def test_a_lost_server_is_exit_1_and_one_line(tmp_path, monkeypatch, capsys):
+    def lost(*_, **__):
+        raise ServerLostError("ws://there: connection lost")
+
+    monkeypatch.setattr("manipose_mj.evaluation.episode.run_episode", lost)
+    monkeypatch.setattr("manipose_mj.cli.builtin_objects.load_objects", lambda names, jobs: [])
+    words = ["--objects", "mug_000", "--pose", "estimated", "--estimator", MIDDLE.name]
+    out = ["--jobs", "1", "--episodes", "2", "--out", str(tmp_path / "out")]
+    assert main(["evaluate", TASK, *words, *out]) == 1
+    said = capsys.readouterr().err
+    assert said == "manipose: ws://there: connection lost\n"
+
+
+def test_episodes_are_asked_of_it(tmp_path, monkeypatch):
+    asked = []
+
+    def run_episode(config, spec, *, episode, pose, estimator):
+        asked.append((pose, estimator))
+        return fake.make_runner()(config, spec, episode=episode, pose=pose)
+
+    monkeypatch.setattr("manipose_mj.evaluation.episode.run_episode", run_episode)
+    evaluate(config(tmp_path))
+    assert asked == [("estimated", MIDDLE)] * 4

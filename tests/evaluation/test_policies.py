@@ -1,0 +1,270 @@
+"""Episodes of policies: rates, clipping, rules, failures, in process and over a websocket."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipose_mj.cli.main import main
+from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.episode import environment_of, run_episode, run_policy_episode
+from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.protocol import load as load_protocol
+from manipose_mj.evaluation.records import read_results
+from manipose_mj.evaluation.runner import RUN_FILE, evaluate
+from manipose_mj.policies.loading import load_policy
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from tests.few_objects import config, few
+from tests.places import ROOT
+from tests.policies.own_policies import Reaching
+from tests.policies.test_remote import served
+
+TASK = "single_object/target_pose"
+HERE = "tests.policies.own_policies"
+REACHING = PolicySettings(f"{HERE}:Reaching")
+
+
+def env_config(**options: Any) -> EnvConfig:
+    return config(TASK, **{"obs_mode": "state", **options})
+
+
+def evaluation(out: Path, settings: PolicySettings, **options: Any) -> EvaluationConfig:
+    options = {"episodes": 4, "objects": few(TASK), **options}
+    return EvaluationConfig((TASK,), out, policy=settings, **options)
+
+
+def timeless(out: Path) -> list[dict[str, Any]]:
+    lines = (out / "results.jsonl").read_text().splitlines()
+    return [
+        {k: v for k, v in json.loads(line).items() if k not in ("wall_s", "policy_s")}
+        for line in lines
+    ]
+
+
+def run(settings: PolicySettings, seed: int = 1, **options: Any):
+    return run_policy_episode(env_config(**options), EpisodeSpec(seed), settings=settings)[0]
+
+
+@pytest.mark.parametrize(
+    ("hz", "execute", "decisions", "steps"),
+    [(10.0, None, 5, 5 * 4 * 5), (50.0, None, 5, 5 * 4), (10.0, 1, 5, 5 * 5), (15.0, 3, 5, 50)],
+)
+def test_actions_are_held_at_the_rate_and_answers_cut(hz, execute, decisions, steps):
+    result = run(replace(REACHING, hz=hz, execute=execute))
+    assert (result.decisions, result.steps) == (decisions, steps)
+    assert result.clipped_actions == 0 and 0 < result.policy_s < result.wall_s
+    assert (result.failure, result.pose_source) == ("release", "none")
+
+
+def test_held_targets_stay_where_the_action_sent_them():
+    """In a mode of differences an action moves once, not in every control step."""
+    moving = PolicySettings(
+        f"{HERE}:Once", control_mode="pd_joint_target_delta_pos", hz=10.0, stop="horizon"
+    )
+    _, trajectory = run_policy_episode(
+        env_config(control_mode=moving.control_mode), EpisodeSpec(1), settings=moving
+    )
+    moved = np.abs(trajectory.qpos[-1, :7] - trajectory.qpos[0, :7])
+    np.testing.assert_allclose(moved[0], 0.1, atol=0.01)
+
+
+def test_what_is_beyond_a_limit_is_clipped_and_counted():
+    result = run(replace(REACHING, arguments='{"beyond": 0.01}'))
+    assert result.clipped_actions == 20
+    assert run(replace(REACHING, arguments='{"beyond": 1e-7}')).clipped_actions == 0
+
+
+def test_true_poses_are_named():
+    seeing = replace(REACHING, obs_mode="state+pose")
+    assert run(seeing, obs_mode="state+pose").pose_source == "oracle"
+    assert evaluation(Path(), seeing).poses == {"objects": "true", "furniture": "true"}
+    assert evaluation(Path(), REACHING).poses == {"objects": "none", "furniture": "none"}
+
+
+@pytest.mark.parametrize(("stop", "steps"), [("success", 25), ("horizon", 100)])
+def test_an_episode_ends_half_a_second_after_success_or_not(stop, steps, monkeypatch):
+    monkeypatch.setattr("manipose_mj.tasks.core.task.success", lambda *goals: True)
+    result = run(replace(REACHING, stop=stop))
+    assert (result.steps, result.success_once, result.success_at_end) == (steps, True, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "stage", "said"),
+    [
+        ("answering_nan", "policy", "no finite number"),
+        ("answering_flat", "policy", r"shape \(8,\)"),
+        ("GivingUp", "plan", "no way"),
+    ],
+)
+def test_a_wrong_answer_is_a_failure_of_its_stage(name, stage, said):
+    result = run(PolicySettings(f"{HERE}:{name}"))
+    assert result.failure == stage and result.steps == 0
+    assert re.search(said, result.reason)
+
+
+def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path):
+    results = evaluate(evaluation(tmp_path, PolicySettings(f"{HERE}:Raising"), episodes=1))
+    assert results[0].failure == "policy" and "KeyError: 'weights'" in results[0].reason
+    (note,) = tmp_path.rglob("*.error.txt")
+    assert "own_policies.py" in note.read_text()
+
+
+@pytest.mark.full
+def test_the_baseline_is_a_policy_behind_the_same_door():
+    settings = PolicySettings(
+        "manipose_mj.policies.baseline:BaselinePolicy", hz=50.0, stop="horizon"
+    )
+    one, path = run_episode(env_config(), EpisodeSpec(1))
+    two, again = run_policy_episode(env_config(), EpisodeSpec(1), settings=settings)
+    assert replace(one, wall_s=0, policy_s=0) == replace(two, wall_s=0, policy_s=0)
+    assert one.success_at_end and one.decisions == one.steps + 1
+    np.testing.assert_array_equal(path.qpos, again.qpos)
+    assert path.annotations == again.annotations
+    with pytest.raises(InputError, match="the baseline acts in pd_joint_pos at 50 Hz"):
+        run(replace(settings, hz=10.0))
+
+
+def test_in_process_and_over_a_websocket_results_are_equal(tmp_path):
+    evaluate(evaluation(tmp_path / "here", REACHING))
+    load_policy.cache_clear()
+    with served(load_policy(REACHING.name)) as server:
+        evaluate(evaluation(tmp_path / "there", replace(REACHING, name=server.address)))
+    assert timeless(tmp_path / "here") == timeless(tmp_path / "there")
+    assert json.loads((tmp_path / "here" / RUN_FILE).read_text())["policy metadata"] == {
+        "name": "reaching"
+    }
+
+
+@pytest.mark.full
+def test_results_do_not_depend_on_the_number_of_jobs(tmp_path):
+    evaluate(evaluation(tmp_path / "one", REACHING))
+    evaluate(evaluation(tmp_path / "two", REACHING, jobs=2))
+    with served(Reaching) as server:
+        evaluate(evaluation(tmp_path / "away", replace(REACHING, name=server.address), jobs=2))
+    assert timeless(tmp_path / "one") == timeless(tmp_path / "two") == timeless(tmp_path / "away")
+
+
+@contextmanager
+def process_serving(name: str, port: int = 0) -> Iterator[str]:
+    """The address of a policy in a process of its own."""
+    command = [sys.executable, "-m", HERE, name, str(port)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_server_lost_in_the_middle_can_be_resumed(tmp_path, capsys):
+    out = tmp_path / "out"
+    with process_serving("Dying") as address:
+        lost = evaluation(out, replace(REACHING, name=address))
+        with pytest.raises(ServerLostError, match="repeat with --resume"):
+            evaluate(lost)
+    assert len(read_results(out / "results.jsonl")[0]) == 2
+    load_policy.cache_clear()
+    words = ["evaluate", TASK, "--episodes", "4", "--jobs", "1", "--out", str(out), "--resume"]
+    words += ["--policy", address, "--objects", *few(TASK)]
+    assert main(words) == 2
+    assert "no policy server answers there" in capsys.readouterr().err
+    with process_serving("Reaching", int(address.rpartition(":")[2])):
+        evaluate(lost, resume=True)
+    evaluate(evaluation(tmp_path / "whole", REACHING))
+    assert timeless(out) == timeless(tmp_path / "whole")
+
+
+def test_resume_refuses_the_results_of_another_policy(tmp_path):
+    settings = PolicySettings(f"{HERE}:answering_nan")
+    evaluate(evaluation(tmp_path, settings, episodes=1))
+    for other in (REACHING, replace(settings, hz=20.0)):
+        with pytest.raises(InputError, match="its results have policy "):
+            evaluate(evaluation(tmp_path, other, episodes=1), resume=True)
+
+
+def test_the_command_repeats_the_evaluation(tmp_path):
+    settings = PolicySettings("a.b:C", '{"path": "x y"}', "state+pose", hz=12.5, execute=3)
+    config = EvaluationConfig((TASK,), tmp_path, 5, protocol="v1", resample=4, policy=settings)
+    assert (
+        '--protocol v1 --resample 4 --policy a.b:C --policy-args \'{"path": "x y"}\' --obs-mode '
+        "state+pose --control-mode pd_joint_pos --hz 12.5 --execute 3 --obs-format manipose "
+        "--stop success"
+    ) in config.command
+
+
+def test_resampling_keeps_what_an_episode_is_about(tmp_path):
+    asked = EvaluationConfig((TASK,), tmp_path, 20, protocol="v1")
+    other = replace(asked, resample=1)
+    frozen = load_protocol("v1")
+    for episode in range(20):
+        one, two = asked.episode_spec(TASK, episode), other.episode_spec(TASK, episode)
+        assert one.object == two.object == frozen.episode(TASK, episode).object
+        assert one.seed != two.seed == other.episode_seed(TASK, episode)
+    again = replace(asked, resample=2)
+    assert again.episode_seed(TASK, 0) != other.episode_seed(TASK, 0)
+    assert other.identity["resample"] == 1 and asked.identity["resample"] is None
+
+
+POLICY = f"evaluate {TASK} --jobs 1 --out {{tmp}}/out --policy {HERE}:Reaching"
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (f"evaluate {TASK} --policy no.module:A --out {{tmp}}/out", "cannot import no.module"),
+        (f"evaluate {TASK} --policy {HERE}:WithoutInfer --out {{tmp}}/out", "no method infer"),
+        (f"evaluate {TASK} --policy ws://localhost:9 --out {{tmp}}/out", "no policy server"),
+        (f"{POLICY} --obs-mode state+poses", "did you mean pose"),
+        (f"{POLICY} --obs-mode state+pose/handle", "unknown observation key 'pose/handle'"),
+        (f"{POLICY} --control-mode pd_joint", "did you mean pd_joint"),
+        (f"{POLICY} --control-mode primitive", "has no rate"),
+        (f"{POLICY} --hz 0", "hz is 0; expected more than 0 and at most 50"),
+        (f"{POLICY} --hz 60", "hz is 60; expected more than 0 and at most 50"),
+        (f"{POLICY} --execute 0", "execute is 0; expected at least 1"),
+        (f"{POLICY} --pose estimated", "leave it out with a policy"),
+        (f"{POLICY} --obs-format droid --obs-mode state", "add --obs-mode state+rgb"),
+        (f"{POLICY} --policy-args [1]", "expected a JSON object"),
+        (f"{POLICY} --resample 3", "and a protocol"),
+        (f"evaluate {TASK} --hz 5", "hz: for a policy only"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(argv, said, tmp_path, capsys):
+    words = argv.format(tmp=tmp_path).split()
+    if "handle" in argv:
+        words += ["--objects", *few(TASK)]
+    assert main(words) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and said in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_actions_of_another_control_mode_end_the_evaluation(tmp_path, capsys):
+    words = ["evaluate", TASK, "--jobs", "1", "--out", str(tmp_path / "out")]
+    words += ["--policy", f"{HERE}:answering_narrow", "--objects", *few(TASK)]
+    assert main(words) == 2
+    assert "have 7 numbers; pd_joint_pos takes 8" in capsys.readouterr().err
+
+
+def test_a_step_that_nobody_observes_changes_only_the_observation():
+    one = environment_of(env_config(obs_mode="state+pose"))
+    first = one.reset(EpisodeSpec(4)).observation
+    target = np.append(first["panda/joint_positions"] + 0.05, 0.04)
+    looked = [one.step(target).observation for _ in range(6)]
+    one.reset(EpisodeSpec(4))
+    steps = [one.step(target, observe=i % 3 == 2).observation for i in range(6)]
+    for name, value in looked[5].items():
+        np.testing.assert_array_equal(steps[5][name], value)
+        np.testing.assert_array_equal(steps[2][name], looked[2][name])
+        np.testing.assert_array_equal(steps[4][name], looked[2][name])
