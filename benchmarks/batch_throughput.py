@@ -3,8 +3,9 @@
 python benchmarks/throughput.py --engine warp|c [--only TASK] [--worlds N ...] [--objects NAME ...]
 
 Both loops run in one process, in turns; medians of the turns. The bare loop of MuJoCo Warp is one captured graph a
-control step: `step1`, then `step2` and `step1` for every physics step, with the set-points that our loop sent. Figures
-count only without overflow and divergence, which are printed.
+control step: `step1`, then `step2` and `step1` for every physics step, with the set-points that our loop sent; that of
+engine `c` is one call of `mujoco.rollout` with as many threads as our loop has processes. Figures count only without
+overflow and divergence, which are printed.
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from mujoco import rollout
 
 from manipose_mj import batch
 from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 TURNS = 5
 HELD = 25  # control steps for which a random target is held
@@ -44,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--starts", type=int, default=8, help="drawn before the measurement")
     parser.add_argument("--pool", type=Path, help="drawn starts, read from here or written here")
     parser.add_argument("--steps", type=int, default=50, help="control steps in a turn")
+    parser.add_argument("--processes", type=int, default=1, help="of engine c")
     parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
     parser.add_argument("--impratio", type=float, help="instead of the model's own")
     parser.add_argument("--resets", type=float, default=0.0, help="share of worlds reset a step")
@@ -84,7 +89,7 @@ def _pool(task: str, arguments: argparse.Namespace) -> StartPool:
 
 def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) -> None:
     started = time.perf_counter()
-    worlds = batch.from_pool(pool, count, arguments.engine)
+    worlds = batch.from_pool(pool, count, arguments.engine, processes=arguments.processes)
     made = time.perf_counter() - started
     state = worlds.reset(jax.random.key(0))
     actions = _actions(state, arguments.steps)
@@ -99,13 +104,16 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
         horizon = worlds.pool.layout.horizon
         spread = jnp.arange(count) % round(1 / arguments.resets)
         state = state._replace(count=horizon - 1 - spread.astype(jnp.int32))
-    bare = _bare(worlds, state, actions)
+    if arguments.engine == "c":
+        bare = _bare_c(worlds, state, actions, arguments.processes)
+    else:
+        bare = _bare_warp(worlds, state, actions)
     ours, others, ended = [], [], []
     for _ in range(TURNS):
         seconds, (_, seen) = _timed(lambda: roll(state, actions))
         ours.append(seconds)
         ended.append(int(seen.terminated.sum()))
-        others.append(_timed(bare)[0] if bare else float("nan"))
+        others.append(_timed(bare)[0])
     substeps = worlds.pool.layout.substeps
     rate = count * arguments.steps / statistics.median(ours)
     bare_rate = count * arguments.steps * substeps / statistics.median(others)
@@ -140,13 +148,47 @@ def _actions(state: batch.State, steps: int) -> jax.Array:
     return jnp.repeat(jnp.concatenate([arm, opening], axis=-1), HELD, axis=0)[:steps]
 
 
-def _bare(
+def _bare_c(
+    worlds: batch.Worlds, state: batch.State, actions: jax.Array, threads: int
+) -> Callable[[], object]:
+    """`mujoco.rollout` of the same states and set-points."""
+    pool, rows = worlds.pool, np.asarray(state.row)
+    substeps = pool.layout.substeps
+    models, own = {}, RowModels(pool)
+    for row in set(rows.tolist()):
+        models[row] = mujoco.MjModel.__copy__(own.at(row))
+    listed = [models[row] for row in rows]
+
+    def data_of(words: np.ndarray, model: mujoco.MjModel) -> mujoco.MjData:
+        data = mujoco.MjData(model)
+        write_simulation(model, data, unflatten(model, data, words.view(float)))
+        return data
+
+    full = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    first = np.zeros((len(rows), mujoco.mj_stateSize(listed[0], full)))
+    for words, model, out in zip(np.asarray(state.simulation), listed, first, strict=True):
+        mujoco.mj_getState(model, data_of(words, model), out, full)
+    control = np.zeros((len(rows), len(actions), listed[0].nu))
+    for step, action in enumerate(actions):
+        state = worlds.step(state, action)
+        for i, words in enumerate(np.asarray(state.simulation)):
+            control[i, step] = data_of(words, listed[i]).ctrl
+    control = np.repeat(control, substeps, axis=1)
+    datas = [mujoco.MjData(listed[0]) for _ in range(threads)]
+    roll = rollout.Rollout(nthread=threads if threads > 1 else 0)
+
+    def run() -> object:
+        return roll.rollout(listed, datas, first, control)[0][:, -1]
+
+    run()
+    return run
+
+
+def _bare_warp(
     worlds: batch.Worlds, state: batch.State, actions: jax.Array
-) -> Callable[[], object] | None:
-    """The physics alone of the same states and set-points; None where the engine has no other way."""
+) -> Callable[[], object]:
+    """The captured physics of the same states and set-points."""
     engine = worlds.engine
-    if engine.name == "c":
-        return None
 
     def sent(state: batch.State, action: jax.Array) -> tuple[batch.State, jax.Array]:
         state = worlds.step(state, action)

@@ -45,6 +45,10 @@ class Engine(Protocol):
         """
         ...
 
+    def overflowed(self, physics: Physics) -> Bool[Array, " worlds"]:
+        """Whether there was too little room for a world's contacts or constraints since its start."""
+        ...
+
     def close(self) -> None:
         """Free what the engine holds; it cannot be used afterwards."""
         ...

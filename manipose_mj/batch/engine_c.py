@@ -84,6 +84,9 @@ class CEngine:
     ) -> tuple[UInt32[Array, "worlds words"], Bool[Array, " worlds"], Measurement]:
         return jax.pure_callback(self._advance, self._shapes, physics, rows, targets)
 
+    def overflowed(self, physics: UInt32[Array, "worlds words"]) -> Bool[Array, " worlds"]:
+        return jnp.zeros(len(physics), bool)
+
     def close(self) -> None:
         for worker in self._workers:
             worker.shutdown(cancel_futures=True)

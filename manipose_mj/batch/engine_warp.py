@@ -1,5 +1,6 @@
 """The engine `warp`: MuJoCo Warp called from JAX, one captured graph a control step."""
 
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import jax
@@ -15,12 +16,15 @@ from manipose_mj.batch import warp_kernels as kernels
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.row_fields import Capacity, RowFields
 from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, most_motion
 from manipose_mj.poses import Array
 
 Physics = dict[str, Array]
 _FASTEST = 1e3  # nothing in a scene moves at this speed [m/s, rad/s]; what does has diverged
+# Captured steps hold several times what the data do (measured: 3.2 and 3.9 times).
+_SCRATCH = 4
 _MOVING = ("qpos", "qvel", "ctrl", "qacc_warmstart")  # the state of a world
 # What measurements are made of, as MuJoCo's data have them.
 _READ = ("xpos", "xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "actuator_force")
@@ -40,7 +44,7 @@ class WarpEngine:
           capacity: Room for contacts and constraints; None: estimated from the starts.
 
         Raises:
-          InputError: The pool has several scenes that no model can stand for.
+          InputError: The pool has several scenes that no model can stand for, or the device has too little memory.
         """
         self._pool, self._worlds = pool, worlds
         self._fields = RowFields(pool)
@@ -50,9 +54,8 @@ class WarpEngine:
         with wp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)
             self._model.opt.warn_overflow = 0  # it is reported, not printed
-            self._data = mujoco_warp.make_data(
-                model, nworld=worlds, naconmax=capacity.contacts, njmax=capacity.constraints
-            )
+            self._require_room(model)
+            self._data = self._made(model, worlds)
             self._tables = self._fields.to_device(self._model, self._data, worlds)
             self._prepare_robot(model)
             self._rows = wp.full(worlds, -1, dtype=int)
@@ -61,6 +64,26 @@ class WarpEngine:
         self._owned = len(pool.layout.objects) + len(pool.layout.parts)
         self._addresses = jax.tree.map(jnp.asarray, self._fields.addresses)
         self._call = self._compiled(model)
+
+    def _made(self, model: mujoco.MjModel, worlds: int) -> Any:
+        """Data of so many worlds, each with its share of the room."""
+        room = self.capacity
+        contacts = -(-room.contacts * worlds // self._worlds)
+        return mujoco_warp.make_data(
+            model, nworld=worlds, naconmax=contacts, njmax=room.constraints
+        )
+
+    def _require_room(self, model: mujoco.MjModel) -> None:
+        """Raises InputError where the device has less memory than the worlds take."""
+        if not self._device.is_cuda:
+            return
+        needed = _SCRATCH * _size(self._made(model, 1)) * self._worlds
+        free = self._device.free_memory
+        if needed > free:
+            raise InputError(
+                f"{self._worlds} worlds of this task take about {needed / 1e9:.0f} GB of the device; "
+                f"{free / 1e9:.0f} GB are free: make fewer"
+            )
 
     def starts(self) -> Physics:
         return {name: jnp.asarray(v, jnp.float32) for name, v in self._fields.states.items()} | {
@@ -74,12 +97,14 @@ class WarpEngine:
         targets: Float[Array, "worlds substeps 8"],
     ) -> tuple[Physics, Bool[Array, " worlds"], Measurement]:
         found = self._call(rows, targets, *(physics[name] for name in _MOVING))
-        after = dict(
-            zip((*_MOVING, *_READ, "contacts", "diverged", "overflow"), found, strict=True)
-        )
+        names: tuple[str, ...] = (*_MOVING, *_READ, "contacts", "diverged", "overflow")
+        after = {name: array for name, array in zip(names, found, strict=True)}
         kept = {name: after[name] for name in _MOVING}
         kept["overflow"] = physics["overflow"] | after["overflow"]
         return kept, after["diverged"] > 0, self._measured(rows, after)
+
+    def overflowed(self, physics: Physics) -> Bool[Array, " worlds"]:
+        return physics["overflow"] != 0
 
     def close(self) -> None:
         wp.clear_jax_callable_graph_cache(self._call)
@@ -186,26 +211,26 @@ class WarpEngine:
         data = self._data
 
         def control_step(
-            rows: wp.array(dtype=int),
-            targets: wp.array3d(dtype=float),
-            qpos: wp.array2d(dtype=float),
-            qvel: wp.array2d(dtype=float),
-            ctrl: wp.array2d(dtype=float),
-            qacc_warmstart: wp.array2d(dtype=float),
-            qpos_after: wp.array2d(dtype=float),
-            qvel_after: wp.array2d(dtype=float),
-            ctrl_after: wp.array2d(dtype=float),
-            qacc_warmstart_after: wp.array2d(dtype=float),
-            xpos: wp.array2d(dtype=wp.vec3),
-            xmat: wp.array2d(dtype=wp.mat33),
-            site_xpos: wp.array2d(dtype=wp.vec3),
-            site_xmat: wp.array2d(dtype=wp.mat33),
-            cam_xpos: wp.array2d(dtype=wp.vec3),
-            cam_xmat: wp.array2d(dtype=wp.mat33),
-            actuator_force: wp.array2d(dtype=float),
-            contacts: wp.array2d(dtype=int),
-            diverged: wp.array(dtype=int),
-            overflow: wp.array(dtype=int),
+            rows: wp.array[int],
+            targets: wp.array3d[float],
+            qpos: wp.array2d[float],
+            qvel: wp.array2d[float],
+            ctrl: wp.array2d[float],
+            qacc_warmstart: wp.array2d[float],
+            qpos_after: wp.array2d[float],
+            qvel_after: wp.array2d[float],
+            ctrl_after: wp.array2d[float],
+            qacc_warmstart_after: wp.array2d[float],
+            xpos: wp.array2d[wp.vec3],
+            xmat: wp.array2d[wp.mat33],
+            site_xpos: wp.array2d[wp.vec3],
+            site_xmat: wp.array2d[wp.mat33],
+            cam_xpos: wp.array2d[wp.vec3],
+            cam_xmat: wp.array2d[wp.mat33],
+            actuator_force: wp.array2d[float],
+            contacts: wp.array2d[int],
+            diverged: wp.array[int],
+            overflow: wp.array[int],
         ):
             self._take_starts(rows)
             for name, given in zip(_MOVING, (qpos, qvel, ctrl, qacc_warmstart), strict=True):
@@ -250,3 +275,15 @@ class WarpEngine:
             contacts = wp.zeros((self._worlds, 3 * self._owned), dtype=int)
             self._read(rows, contacts, wp.zeros(self._worlds, dtype=int))
             wp.synchronize_device()
+
+
+def _size(data: Any) -> int:
+    """Bytes of all arrays in a structure of MuJoCo Warp."""
+    total = 0
+    for field in fields(data):
+        value = getattr(data, field.name)
+        if isinstance(value, wp.array):
+            total += value.size * wp.types.type_size_in_bytes(value.dtype)
+        elif is_dataclass(value):
+            total += _size(value)
+    return total

@@ -39,7 +39,7 @@ _FIELDS = (
 )
 # MuJoCo Warp places geoms that cannot move once, not in every world anew.
 _STATIC = ("geom_xpos", "geom_xmat")
-# Contacts and constraint rows that may come to those of a start: a hand in the midst of things.
+# Contacts and constraint rows that may come to those of a start: a hand that touches several objects.
 _MORE_CONTACTS, _MORE_ROWS = 24, 192
 
 
@@ -104,7 +104,7 @@ class RowFields:
         self._sizes = np.array(sizes)
 
     def capacity(self, worlds: int) -> Capacity:
-        """Room for twice what the starts need, and a hand in the midst of things."""
+        """Room for twice what the starts need, and a hand that touches several objects."""
         contacts = 2 * float(self._sizes[:, 0].mean()) + _MORE_CONTACTS
         rows = 2 * int(self._sizes[:, 1].max()) + _MORE_ROWS
         return Capacity(int(contacts * worlds), rows)

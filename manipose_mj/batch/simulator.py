@@ -15,13 +15,14 @@ from jaxtyping import Bool, Float, Int, UInt32
 from manipose_mj.batch.measurement import Measurement, measure
 from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.starts import StartPool
-from manipose_mj.mjcf.panda.servos import Servos
+from manipose_mj.mjcf.panda.servos import Servos, follow_together
 from manipose_mj.tasks.core.simulation_state import (
     read_simulation,
     unflatten,
     write_simulation,
 )
 
+_GROUP = 16  # worlds that step side by side; their data stay in the processor's cache
 # What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
 _DIVERGED = tuple(
     getattr(mujoco.mjtWarning, f"mjWARN_{name}")
@@ -31,9 +32,10 @@ _DIVERGED = tuple(
 
 @dataclass
 class _World:
-    """Attributes: scene, its model's number; data; servos; words, its state as last returned."""
+    """Attributes: row, of its start; model, of it; data; servos; words, its state as last returned."""
 
-    scene: int
+    row: int
+    model: mujoco.MjModel
     data: mujoco.MjData
     servos: Servos
     words: bytes
@@ -68,48 +70,46 @@ class Simulator:
           Their states, whether each diverged (its state is then without meaning), and measurements.
         """
         states, diverged, measured = np.zeros_like(words), np.zeros(len(rows), bool), []
-        for i, (world, row) in enumerate(zip(worlds, rows.tolist(), strict=True)):
-            states[i], diverged[i], now = self._advance(world, words[i], row, targets[i])
-            measured.append(now)
+        for first in range(0, len(rows), _GROUP):
+            group = range(first, min(first + _GROUP, len(rows)))
+            now = [self._at(worlds[i], words[i], int(rows[i])) for i in group]
+            self._step(now, targets[first : group.stop])
+            for i, world in zip(group, now, strict=True):
+                start = self._pool.starts[rows[i]]
+                if any(world.data.warning[kind].number for kind in _DIVERGED):
+                    del self._worlds[worlds[i]]
+                    diverged[i] = True
+                    measured.append(start.measurement)
+                    continue
+                flat = read_simulation(world.model, world.data).flat()
+                states[i] = packed(flat, self._size)
+                world.words = states[i].tobytes()
+                measured.append(measure(world.model, world.data, start.addresses))
         stacked = Measurement(*(np.stack(field) for field in zip(*measured, strict=True)))
         return states, diverged, stacked
 
-    def _advance(
-        self,
-        world: int,
-        words: UInt32[np.ndarray, " words"],
-        row: int,
-        targets: Float[np.ndarray, "substeps 8"],
-    ) -> tuple[UInt32[np.ndarray, " words"], bool, Measurement]:
-        start = self._pool.starts[row]
-        model = self._models.at(row)
-        now = self._at(world, words, row, model)
-        data, follow = now.data, now.servos.follow
-        for target in targets:
-            follow(target)
-            # The second half of a step, then the first of the next, as the CPU's environment steps.
-            mujoco.mj_step2(model, data)
-            mujoco.mj_step1(model, data)
-        diverged = any(data.warning[kind].number for kind in _DIVERGED)
-        if diverged:
-            del self._worlds[world]
-            return words, True, start.measurement
-        after = packed(read_simulation(model, data).flat(), self._size)
-        now.words = after.tobytes()
-        return after, False, measure(model, data, start.addresses)
+    def _step(self, worlds: list[_World], targets: Float[np.ndarray, "worlds substeps 8"]) -> None:
+        """The physics steps of some worlds, side by side: NumPy is quicker with all of them at once."""
+        servos = [world.servos for world in worlds]
+        pairs = [(world.model, world.data) for world in worlds]
+        for substep in range(self._substeps):
+            follow_together(servos, targets[:, substep])
+            for model, data in pairs:
+                # The second half of a step, then the first of the next, as the CPU's environment steps.
+                mujoco.mj_step2(model, data)
+                mujoco.mj_step1(model, data)
 
-    def _at(
-        self, world: int, words: UInt32[np.ndarray, " words"], row: int, model: mujoco.MjModel
-    ) -> _World:
-        """The world with its data in this state."""
-        start = self._pool.starts[row]
-        known = self._worlds.get(world)
-        if known is None or known.scene != start.scene:
+    def _at(self, number: int, words: UInt32[np.ndarray, " words"], row: int) -> _World:
+        """A world with its data in this state."""
+        known = self._worlds.get(number)
+        if known is None or known.row != row:
+            start, model = self._pool.starts[row], self._models.at(row)
             data = mujoco.MjData(model)
             servos = Servos.of(model, data, start.addresses.servos)
-            known = self._worlds[world] = _World(start.scene, data, servos, b"")
+            known = self._worlds[number] = _World(row, model, data, servos, b"")
         if known.words != words.tobytes():
-            write_simulation(model, known.data, unflatten(model, known.data, words.view(float)))
+            state = unflatten(known.model, known.data, words.view(float))
+            write_simulation(known.model, known.data, state)
         return known
 
 

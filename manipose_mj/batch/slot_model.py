@@ -1,4 +1,4 @@
-"""One model for scenes that differ in their objects: a body's shapes become slots, filled anew in every world.
+"""One model for scenes that differ in their objects: a body's shapes become slots that every world fills for itself.
 
 MuJoCo Warp takes which mesh a geom is, its size and its pose from each world, but not its type: a body has as
 many slots of each type as any scene needs. Slots that a world leaves empty touch nothing. Visual shapes of such

@@ -9,9 +9,7 @@ _RIGHT_PAD = wp.constant(RIGHT_PAD)
 
 
 @wp.kernel
-def find_changed(
-    rows: wp.array(dtype=int), current: wp.array(dtype=int), changed: wp.array(dtype=int)
-):
+def find_changed(rows: wp.array[int], current: wp.array[int], changed: wp.array[int]):
     """Which worlds have another start than the model's fields are of, and that they have it now."""
     world = wp.tid()
     changed[world] = wp.where(rows[world] != current[world], 1, 0)
@@ -20,10 +18,10 @@ def find_changed(
 
 @wp.kernel
 def copy_reals(
-    rows: wp.array(dtype=int),
-    changed: wp.array(dtype=int),
-    table: wp.array2d(dtype=float),
-    field: wp.array2d(dtype=float),
+    rows: wp.array[int],
+    changed: wp.array[int],
+    table: wp.array2d[float],
+    field: wp.array2d[float],
 ):
     """Write the start's own values of a field of the model, or of what never moves."""
     world, i = wp.tid()
@@ -33,10 +31,10 @@ def copy_reals(
 
 @wp.kernel
 def copy_integers(
-    rows: wp.array(dtype=int),
-    changed: wp.array(dtype=int),
-    table: wp.array2d(dtype=int),
-    field: wp.array2d(dtype=int),
+    rows: wp.array[int],
+    changed: wp.array[int],
+    table: wp.array2d[int],
+    field: wp.array2d[int],
 ):
     """The same for whole numbers."""
     world, i = wp.tid()
@@ -46,21 +44,21 @@ def copy_integers(
 
 @wp.kernel
 def limit_set_points(
-    targets: wp.array3d(dtype=float),
+    targets: wp.array3d[float],
     substep: int,
-    qpos: wp.array2d(dtype=float),
-    tcp: wp.array2d(dtype=wp.vec3),
-    anchors: wp.array2d(dtype=wp.vec3),
-    axes: wp.array2d(dtype=wp.vec3),
-    joints: wp.array(dtype=int),
-    angles: wp.array(dtype=int),
-    limits: wp.array2d(dtype=float),
+    qpos: wp.array2d[float],
+    tcp: wp.array2d[wp.vec3],
+    anchors: wp.array2d[wp.vec3],
+    axes: wp.array2d[wp.vec3],
+    joints: wp.array[int],
+    angles: wp.array[int],
+    limits: wp.array2d[float],
     site: int,
     arm: int,
     gripper: int,
     tcp_lead: float,
     widest: float,
-    ctrl: wp.array2d(dtype=float),
+    ctrl: wp.array2d[float],
 ):
     """`mjcf.panda.speed_limits.allowed_set_points`, one world a thread.
 
@@ -93,13 +91,13 @@ def limit_set_points(
 
 @wp.kernel
 def find_contacts(
-    count: wp.array(dtype=int),
-    world_of: wp.array(dtype=int),
-    geoms: wp.array(dtype=wp.vec2i),
-    rows: wp.array(dtype=int),
-    owners: wp.array2d(dtype=int),
+    count: wp.array[int],
+    world_of: wp.array[int],
+    geoms: wp.array[wp.vec2i],
+    rows: wp.array[int],
+    owners: wp.array2d[int],
     owned: int,
-    found: wp.array2d(dtype=int),
+    found: wp.array2d[int],
 ):
     """Whether the robot, its left pad or its right pad touches each object and part of its world."""
     i = wp.tid()
@@ -116,10 +114,10 @@ def find_contacts(
 
 @wp.kernel
 def find_diverged(
-    qpos: wp.array2d(dtype=float),
-    qvel: wp.array2d(dtype=float),
+    qpos: wp.array2d[float],
+    qvel: wp.array2d[float],
     fastest: float,
-    diverged: wp.array(dtype=int),
+    diverged: wp.array[int],
 ):
     """Whether a position is not finite, or a speed too high or not a number."""
     world = wp.tid()

@@ -38,6 +38,8 @@ class State(NamedTuple):
       truncated: Whether it ended at the horizon.
       success: Whether the goals were met after the last step.
       success_once: Whether they were after any step of the episode.
+      overflowed: Whether the engine had too little room for the contacts of the episode at any step: its physics
+        does not count.
       row: Of each world's start in the pool.
       count: Control steps of the present episode.
       succeeded: Whether its goals were met after any of them.
@@ -53,6 +55,7 @@ class State(NamedTuple):
     truncated: Bool[Array, " worlds"]
     success: Bool[Array, " worlds"]
     success_once: Bool[Array, " worlds"]
+    overflowed: Bool[Array, " worlds"]
     row: Int[Array, " worlds"]
     count: Int[Array, " worlds"]
     succeeded: Bool[Array, " worlds"]
@@ -75,6 +78,7 @@ class Transition(NamedTuple):
     truncated: Bool[Array, "*steps worlds"]
     success: Bool[Array, "*steps worlds"]
     success_once: Bool[Array, "*steps worlds"]
+    overflowed: Bool[Array, "*steps worlds"]
 
 
 class Worlds:
@@ -170,6 +174,7 @@ class Worlds:
                 after.truncated,
                 after.success,
                 after.success_once,
+                after.overflowed,
             )
 
         return jax.lax.scan(one, state, inputs)
@@ -232,6 +237,7 @@ class Worlds:
             truncated=never,
             success=never,
             success_once=never,
+            overflowed=never,
             row=rows,
             count=jnp.zeros(len(rows), jnp.int32),
             succeeded=never,
@@ -266,6 +272,7 @@ class Worlds:
             truncated=truncated,
             success=success,
             success_once=succeeded,
+            overflowed=self.engine.overflowed(simulation),
             row=rows,
             count=count,
             succeeded=succeeded,

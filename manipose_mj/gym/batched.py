@@ -21,7 +21,8 @@ class BatchedEnv(VectorEnv):
 
     An episode that ends is followed by the next within the same step; `infos["final_obs"]` then holds what was
     last seen of it, for the worlds that `infos["_final_obs"]` marks. `torch.from_dlpack` reads the arrays without a
-    copy. `infos` also holds `success`, `success_once` and `failure`, whether the simulation diverged.
+    copy. `infos` also holds `success`, `success_once`, `failure`, whether the simulation diverged, and `overflowed`, whether
+    the engine had too little room for the episode's contacts.
     """
 
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.SAME_STEP}
@@ -86,6 +87,7 @@ class BatchedEnv(VectorEnv):
             "success": state.success,
             "success_once": state.success_once,
             "failure": state.terminated,
+            "overflowed": state.overflowed,
             "final_obs": state.final_observation,
             "_final_obs": state.done,
         }

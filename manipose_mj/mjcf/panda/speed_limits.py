@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.mjcf.panda.kinematics import (
     DH,
@@ -54,8 +54,7 @@ def allowed_set_points(
       most: That a set-point may move in one step [rad].
     """
     xp = namespace(targets)
-    allowed = xp.minimum(xp.maximum(targets, set_points - most), set_points + most)
-    allowed = xp.minimum(xp.maximum(allowed, joints - JOINT_LEADS), joints + JOINT_LEADS)
+    allowed = allowed_for_joints(targets, set_points, joints, most)
     leads = allowed - joints
     if xp is not np or np.abs(leads).dot(_REACH) > TCP_LEAD:
         motion = tcp_jacobian().dot(leads)
@@ -63,3 +62,20 @@ def allowed_set_points(
         slowed = joints + (TCP_LEAD / xp.maximum(length, TCP_LEAD)) * leads
         allowed = xp.where(length > TCP_LEAD, slowed, allowed)
     return xp.minimum(xp.maximum(allowed, _LOWEST), _HIGHEST)
+
+
+def allowed_for_joints(
+    targets: Float[Array, "*b 7"],
+    set_points: Float[Array, "*b 7"],
+    joints: Float[Array, "*b 7"],
+    most: Float[Array, "7"],
+) -> Float[Array, "*b 7"]:
+    """The set-points that drive no joint too fast, whatever the TCP does; arguments as of `allowed_set_points`."""
+    xp = namespace(targets)
+    allowed = xp.minimum(xp.maximum(targets, set_points - most), set_points + most)
+    return xp.minimum(xp.maximum(allowed, joints - JOINT_LEADS), joints + JOINT_LEADS)
+
+
+def tcp_surely_slow(leads: Float[np.ndarray, "*b 7"]) -> Bool[np.ndarray, "*b"]:
+    """Whether set-points so far ahead of the joints [rad] cannot drive the TCP too fast, however the arm is bent."""
+    return np.abs(leads) @ _REACH < (1 - 1e-9) * TCP_LEAD
