@@ -17,6 +17,7 @@ from manipose_mj.control.language.exchanges import (
     append_exchange,
 )
 from manipose_mj.control.language.reply import (
+    NamedMove,
     RefusedError,
     read_reply,
     reply_schema,

@@ -34,7 +34,9 @@ class PlanState:
         self._estimate = estimate
         self.parts = estimate.parts
         self.openings = {name: part.opening for name, part in estimate.parts.items()}
-        self.places = {name: (obj.label_pose,) for name, obj in estimate.objects.items()}
+        self.places: dict[str, tuple[Float[np.ndarray, "4 4"], ...]] = {
+            name: (obj.label_pose,) for name, obj in estimate.objects.items()
+        }
         self.held: str | None = None
 
     def is_open(self, name: str) -> bool:
