@@ -123,16 +123,16 @@ def test_a_missing_seed_is_refused_and_named(card, capsys):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("line", "changes", "message"),
     [
-        ({"seed": 7}, "has seed 7; protocol v1 has"),
-        ({"object": "mug_000"}, "is about mug_000; protocol v1 has"),
-        ({"episode": 9}, "is missing"),
-        ({"steps": "many", "extra": 1}, "line 3 is not an episode's result"),
+        (2, {"seed": 7}, "has seed 7; protocol v1 has"),
+        (8, {"object": "mug_000"}, "is about mug_000; protocol v1 has"),
+        (2, {"episode": 9}, "is missing"),
+        (2, {"steps": "many", "extra": 1}, "line 3 is not an episode's result"),
     ],
 )
-def test_lines_that_the_protocol_does_not_have_are_refused(card, capsys, changes, message):
-    edit_line(card / "runs" / "0" / "results.jsonl", 2, **changes)
+def test_lines_that_the_protocol_does_not_have_are_refused(card, capsys, line, changes, message):
+    edit_line(card / "runs" / "0" / "results.jsonl", line, **changes)
     assert message in refusal(card, capsys)
 
 
