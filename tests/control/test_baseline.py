@@ -41,7 +41,7 @@ def played(task: str, seed: int) -> tuple[EpisodeResult, Trajectory]:
     return _run(task, seed)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("task", "seed"), [(t, seed) for t, seeds in SEEDS.items() for seed in seeds]
 )

@@ -56,7 +56,8 @@ def test_commands_in_pages_exist():
                 for script in re.findall(r"\bbenchmarks/\w+\.py", line):
                     assert (ROOT / script).is_file(), f"{name(page)} names {script}"
                 found = re.match(
-                    r"\s*manipose ((?:assets |demos |pose )?[\w-]+)(.*)", line.partition("#")[0]
+                    r"\s*manipose ((?:assets |demos |pose |protocol )?[\w-]+)(.*)",
+                    line.partition("#")[0],
                 )
                 if found is None:
                     continue

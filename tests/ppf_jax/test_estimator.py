@@ -33,6 +33,7 @@ def mug():
     return half_visible_clouds("mug", [0], 1, points=250)[0]
 
 
+@pytest.mark.full
 def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
     traced = []
 

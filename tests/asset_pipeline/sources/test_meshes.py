@@ -200,6 +200,7 @@ def test_remarks_say_what_will_be_unknown():
     assert "no licence" in licence and "did you mean mug?" in category and "mirror" in category
 
 
+@pytest.mark.full
 def test_folder_of_many_builds_but_for_the_bad_ones(tmp_path, capsys):
     folder, out = tmp_path / "in", tmp_path / "out"
     (folder / "crackers").mkdir(parents=True)

@@ -49,6 +49,7 @@ def test_every_published_object_is_found_and_known():
     assert single.name == "065-a_cups"
 
 
+@pytest.mark.full
 @needs_data
 def test_mesh_frame_is_the_published_one(assets, tmp_path):
     with tarfile.open(YCB / "006_mustard_bottle_google_16k.tgz") as tar:
@@ -60,6 +61,7 @@ def test_mesh_frame_is_the_published_one(assets, tmp_path):
     assert built.visual.uv is not None and next((asset.folder / "meshes").glob("*visual*.png"))
 
 
+@pytest.mark.full
 @needs_data
 def test_labels_follow_the_conventions(assets):
     sugar, mustard, driver = (assets[name].label for name in BUILT)
@@ -72,6 +74,7 @@ def test_labels_follow_the_conventions(assets):
     assert abs(driver.rotation[2, 0]) < 0.05 and driver.extents.argmax() == 0
 
 
+@pytest.mark.full
 @needs_data
 def test_symmetry_is_what_the_shape_has(assets):
     sugar, mustard, driver = (assets[name].label.symmetry for name in BUILT)
@@ -81,6 +84,7 @@ def test_symmetry_is_what_the_shape_has(assets):
     assert len(driver.rotations) == 2  # its handle is flattened on two sides
 
 
+@pytest.mark.full
 @needs_data
 def test_assets_rest_and_can_be_grasped(assets):
     for result in check(assets[BUILT[0]].folder.parent):
@@ -90,6 +94,7 @@ def test_assets_rest_and_can_be_grasped(assets):
     assert assets["006_mustard_bottle"].mass_properties.mass == pytest.approx(0.603)
 
 
+@pytest.mark.full
 @needs_data
 def test_second_build_skips_and_changed_input_builds_again(assets, tmp_path):
     out = assets[BUILT[0]].folder.parent

@@ -72,7 +72,7 @@ def placed(boxes) -> Recording:
     return recording
 
 
-@pytest.mark.sample(2)
+@pytest.mark.full
 @pytest.mark.parametrize("mode", CONTROL_MODES[1:])
 def test_every_mode_goes_where_the_recording_went(cans, reach, mode):
     replay(cans, reach)
@@ -99,7 +99,7 @@ def test_a_success_of_the_baseline_is_one_in_another_mode_and_back(boxes, placed
     assert convert(boxes, converted, "pd_joint_pos").success
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["pd_joint_vel", "pd_ee_target_delta_pose"])
 def test_a_converted_recording_repeats_bit_for_bit(cans, reach, mode):
     converted = convert(cans, reach, mode)
@@ -108,6 +108,7 @@ def test_a_converted_recording_repeats_bit_for_bit(cans, reach, mode):
     np.testing.assert_array_equal(cans.physics.get_state(), end)
 
 
+@pytest.mark.full
 def test_the_modes_of_an_environment_stay_its_own(cans, reach):
     usual = cans.task.control_mode
     convert(cans, replace(reach, actions=reach.actions[:5]), "pd_ee_pose")

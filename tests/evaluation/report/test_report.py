@@ -127,6 +127,7 @@ def test_a_strip_shows_the_episode_in_order(page: str) -> None:
     assert all(np.abs(a - b).mean() > 0.5 for a, b in zip(arrays, arrays[1:], strict=False))
 
 
+@pytest.mark.full
 def test_what_cannot_be_drawn_is_said(evaluation: Path) -> None:
     def lost(env_config, spec):
         raise InputError("assets: no such folder")

@@ -35,7 +35,7 @@ def _true_votes(targets, known) -> PointVotes:
     return PointVotes(logits, hinge, values, scales, jnp.zeros(()))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(6))
 def test_true_votes_give_the_true_parts(sample, seed):
     """Turned, mirrored, enlarged: what points vote for stays one consistent piece of furniture."""
