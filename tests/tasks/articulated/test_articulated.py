@@ -220,9 +220,9 @@ def test_furniture_of_partnet_mobility_serves(tmp_path):
         asset = build_articulated(scan, tmp_path / item.name)
     # Of the built-in objects those that fit, or one's own.
     assert len(_load("store_bottom_drawer", objects=[asset]).task.pool.entities) == 3
-    environment = _load("store_bottom_drawer", objects=[asset, catalogue.load("box", 1)])
+    environment = _load("store_bottom_drawer", objects=[asset, catalogue.load("can", 1)])
     task, _ = _reset(environment, 0)
-    assert task.furniture.asset.name == "46236" and task.object_name == "box_001"
+    assert task.furniture.asset.name == "46236" and task.object_name == "can_001"
     environment.step(HOLD)
     assert task.max_penetration < 0.005
     assert not task.success_now
