@@ -28,7 +28,8 @@ def timeless(path: Path) -> list[dict]:
     """The lines of a results file in their order, times left out."""
     documents = [json.loads(line) for line in path.read_text().splitlines()]
     for document in documents:
-        del document["wall_s"], document["policy_s"]
+        del document["wall_s"]
+        document["policy_s"] = 0.0
     return documents
 
 
