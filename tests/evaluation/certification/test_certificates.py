@@ -8,6 +8,7 @@ from manipose_mj.cli.main import main
 from manipose_mj.control.baseline import MAX_PLANS
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.certification import search
 from manipose_mj.evaluation.certification.certificates import (
     Certificate,
     Certificates,
@@ -95,3 +96,19 @@ def test_commands_find_and_replay(tmp_path, capsys):
     assert main(["protocol", "verify", "--certificates", out, *chosen]) == 0
     assert "1 of 1 certificates hold; of 1 starts" in capsys.readouterr().out
     assert main(["protocol", "certify", "--out", str(tmp_path / "no" / "c.json"), *chosen]) == 2
+
+
+def test_a_certificate_that_no_longer_holds_is_exit_1_with_its_reason(
+    tmp_path, capsys, monkeypatch
+):
+    known = Certificates(V1.sha256)
+    for number in (0, 1):
+        known = known.with_outcome((TASK, number), Certificate(number, MAX_PLANS))
+    save_certificates(known.with_outcome((TASK, 2), "plan: no grasp"), tmp_path / "c.json")
+    outcomes = [((TASK, 1), known.solved[TASK, 1]), ((TASK, 0), "grasp: it slipped")]
+    monkeypatch.setattr(search, "verify", lambda *_: iter(outcomes))
+    words = ["--tasks", TASK, "--episodes", "4", "--certificates", str(tmp_path / "c.json")]
+    assert main(["protocol", "verify", *words]) == 1
+    said = capsys.readouterr().out
+    assert f"{TASK} 0: grasp: it slipped" in said
+    assert "1 of 2 certificates hold; of 4 starts, 1 are known as unsolved and 1 untried" in said
