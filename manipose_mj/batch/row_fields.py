@@ -10,8 +10,10 @@ import numpy as np
 from jaxtyping import Int
 
 from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.slot_bodies import ScenePlaces
 from manipose_mj.batch.slot_model import slot_model
 from manipose_mj.batch.starts import StartPool
+from manipose_mj.mjcf.panda.servos import ServoAddresses
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 from manipose_mj.tasks.scene.indices import NOBODY
 
@@ -27,16 +29,26 @@ _FIELDS = (
     "body_subtreemass",
     "body_invweight0",
     "body_gravcomp",
-    "geom_friction",
-    "geom_solref",
+    "jnt_pos",
+    "jnt_axis",
+    "jnt_range",
+    "jnt_solref",
+    "jnt_solimp",
+    "jnt_stiffness",
+    "jnt_margin",
+    "dof_armature",
     "dof_damping",
     "dof_frictionloss",
     "dof_invweight0",
+    "geom_friction",
+    "geom_solref",
     "actuator_gainprm",
     "actuator_biasprm",
     "cam_pos",
     "cam_quat",
 )
+# What a joint in no scene has: nothing holds it, nothing moves it.
+_UNUSED = {"jnt_range": (-1.0, 1.0), "dof_frictionloss": 0.0}
 # MuJoCo Warp places geoms that cannot move once, not in every world anew.
 _STATIC = ("geom_xpos", "geom_xmat")
 # Contacts and constraint rows that may come to those of a start: a hand that touches several objects.
@@ -78,13 +90,20 @@ class RowFields:
             data = mujoco.MjData(model)
             write_simulation(model, data, unflatten(model, data, start.simulation))
             sizes.append((data.ncon, data.nefc))
-            geoms = slots.geoms[start.scene]
-            for name, values in _fields_of(
-                model, geoms, slots.model, slots.fields[start.scene]
-            ).items():
+            geoms, places = slots.geoms[start.scene], slots.places[start.scene]
+            of_scene = {"body": places.bodies, "jnt": places.joints, "dof": places.dofs}
+            of_scene["geom"] = geoms
+            for name, values in _fields_of(model, of_scene, self.model).items():
                 fields.setdefault(name, []).append(values)
-            for name in _STATES:
-                found[name].append(np.array(getattr(data, name)))
+            for name, values in slots.fields[start.scene].items():
+                fields.setdefault(name, []).append(values)
+            for name, index, rest in (
+                ("qpos", places.angles, self.model.qpos0),
+                ("qvel", places.dofs, 0.0),
+                ("qacc_warmstart", places.dofs, 0.0),
+            ):
+                found[name].append(np.where(index < 0, rest, getattr(data, name)[index]))
+            found["ctrl"].append(np.array(data.ctrl))
             for name in _STATIC:
                 found[name].append(getattr(data, name)[geoms])
             owners.append(np.where(geoms < 0, NOBODY, start.addresses.owners[geoms]))
@@ -97,10 +116,15 @@ class RowFields:
         self.static = {name: np.stack(found[name]) for name in _STATIC}
         self.states = {name: np.stack(found[name]) for name in _STATES}
         self.owners: Int[np.ndarray, "starts geoms"] = np.stack(owners)
-        self.addresses = {
-            name: np.stack([getattr(start.addresses, name) for start in pool.starts])
-            for name in ("bodies", "dofs", "openings", "cameras")
-        }
+        self.addresses = {name: [] for name in ("bodies", "dofs", "openings", "cameras")}
+        for start in pool.starts:
+            at, places = start.addresses, slots.places[start.scene]
+            _require_robot_first(at.servos, places)
+            self.addresses["bodies"].append(places.placed("bodies", at.bodies))
+            self.addresses["dofs"].append(places.placed("dofs", at.dofs))
+            self.addresses["openings"].append(places.placed("angles", at.openings))
+            self.addresses["cameras"].append(at.cameras)
+        self.addresses = {name: np.stack(values) for name, values in self.addresses.items()}
         self._sizes = np.array(sizes)
 
     def capacity(self, worlds: int) -> Capacity:
@@ -132,24 +156,32 @@ class RowFields:
 
 
 def _fields_of(
-    model: mujoco.MjModel,
-    geoms: Int[np.ndarray, " geoms"],
-    slots: mujoco.MjModel,
-    filled: dict[str, np.ndarray],
+    model: mujoco.MjModel, of_scene: dict[str, Int[np.ndarray, "n"]], slots: mujoco.MjModel
 ) -> dict[str, np.ndarray]:
     """What may differ between starts, of the model with slots.
 
     Args:
       model: Of the start.
-      geoms: Of it, in the order of the model with slots; -1: none.
+      of_scene: Its bodies, joints, dofs and geoms, in the order of the model with slots; -1: none.
       slots: The model with slots.
-      filled: Fields of its geoms in the start's scene.
     """
-    fields = {name: np.array(getattr(model, name)) for name in _FIELDS}
-    for name in ("geom_friction", "geom_solref"):
-        fields[name] = np.where(geoms[:, None] < 0, getattr(slots, name), fields[name][geoms])
-    # A start may have changed the friction that its scene was compiled with.
-    return fields | {name: values for name, values in filled.items() if name not in fields}
+    fields = {}
+    for name in _FIELDS:
+        own, index = np.array(getattr(model, name)), of_scene.get(name.split("_")[0])
+        if index is None:
+            fields[name] = own
+            continue
+        absent = (index < 0).reshape(-1, *(1,) * (own.ndim - 1))
+        unused = _UNUSED.get(name, getattr(slots, name))
+        fields[name] = np.where(absent, unused, own[index])
+    return fields
+
+
+def _require_robot_first(servos: ServoAddresses, places: ScenePlaces) -> None:
+    """The robot has the same addresses in all scenes: it comes before objects and furniture."""
+    for name, ids in (("angles", servos.angles), ("angles", servos.fingers), ("dofs", servos.dofs)):
+        ids = np.arange(ids.start, ids.stop)
+        assert np.array_equal(places.placed(name, ids), ids), "the robot does not come first"
 
 
 def _awake(model: mujoco.MjModel) -> mujoco.MjModel:

@@ -1,4 +1,4 @@
-"""One model for scenes that differ in their objects: a body's shapes become slots that every world fills for itself.
+"""One model for scenes that differ in objects and furniture: shapes become slots that every world fills for itself.
 
 MuJoCo Warp takes which mesh a geom is, its size and its pose from each world, but not its type: a body has as
 many slots of each type as any scene needs. Slots that a world leaves empty touch nothing. Visual shapes of such
@@ -13,6 +13,14 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from manipose_mj.batch.slot_bodies import (
+    NONE,
+    Place,
+    ScenePlaces,
+    add_missing,
+    common_tree,
+    scene_places,
+)
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
 
@@ -40,40 +48,49 @@ class SlotModel:
       model: With the bodies, joints, sites, cameras and actuators of every scene.
       geoms: For each scene, which of its geoms is in each of the model's; -1: none.
       fields: For each scene, the `FIELDS` of the model's geoms.
+      places: For each scene, which of its bodies and joints are the model's.
     """
 
     model: mujoco.MjModel
     geoms: tuple[Int[np.ndarray, " geoms"], ...]
     fields: tuple[dict[str, np.ndarray], ...]
+    places: tuple[ScenePlaces, ...]
 
 
 def slot_model(pool: StartPool) -> SlotModel:
     """The model for all scenes of a pool.
 
     Raises:
-      InputError: The scenes differ in more than the shapes of bodies.
+      InputError: The scenes differ in more than bodies, their shapes and joints.
     """
     scenes = pool.scenes
     if len(scenes) == 1:
-        return SlotModel(scenes[0], (np.arange(scenes[0].ngeom),), ({},))
-    _require_alike(pool)
-    changing = [body for body in range(scenes[0].nbody) if _differs(scenes, body)]
+        only = scenes[0]
+        return SlotModel(only, (np.arange(only.ngeom),), ({},), (ScenePlaces.same(only),))
+    tree = common_tree(scenes)
     spec = mujoco.MjSpec.from_string(pool.xml, assets=dict(pool.xml_assets))
-    slots = {body: _add_slots(spec, scenes, body) for body in changing}
+    names = add_missing(spec, scenes, tree)
+    changing = [number for number, place in enumerate(tree) if _differs(scenes, place)]
+    slots = {
+        number: _add_slots(spec, scenes, tree[number], names[number], number) for number in changing
+    }
     model = spec.compile()
     _copy_options(scenes[0].opt, model.opt)
-    geoms, fields = [], []
+    changed = [model.body(names[number]).id for number in changing]
+    geoms, fields, places = [], [], []
     for number, scene in enumerate(scenes):
-        chosen = np.full(model.ngeom, -1)
-        for body in range(model.nbody):
-            if body in slots:
-                for name, sources in slots[body].items():
+        chosen = np.full(model.ngeom, NONE)
+        for index, place in enumerate(tree):
+            if index in slots:
+                for name, sources in slots[index].items():
                     chosen[model.geom(name).id] = sources[number]
             else:
-                chosen[_geoms(model, body)] = _geoms(scene, body)
+                body = model.body(names[index]).id
+                chosen[_geoms(model, body)] = _geoms(scene, place.bodies[number])
         geoms.append(chosen)
-        fields.append(_filled(model, scene, number, chosen, changing))
-    return SlotModel(model, tuple(geoms), tuple(fields))
+        fields.append(_filled(model, scene, number, chosen, changed))
+        places.append(scene_places(model, scene, number, tree, names))
+    return SlotModel(model, tuple(geoms), tuple(fields), tuple(places))
 
 
 def _copy_options(source: mujoco.MjOption, target: mujoco.MjOption) -> None:
@@ -86,23 +103,6 @@ def _copy_options(source: mujoco.MjOption, target: mujoco.MjOption) -> None:
             setattr(target, name, value)
 
 
-def _require_alike(pool: StartPool) -> None:
-    first = pool.scenes[0]
-    for scene in pool.scenes[1:]:
-        same = all(
-            getattr(scene, name) == getattr(first, name)
-            for name in ("nq", "nv", "nu", "nbody", "njnt", "nsite", "ncam")
-        ) and all(
-            np.array_equal(getattr(scene, name), getattr(first, name))
-            for name in ("body_parentid", "jnt_type", "jnt_bodyid", "site_bodyid", "cam_bodyid")
-        )
-        if not same:
-            raise InputError(
-                "engine 'warp' takes scenes that differ in the shapes of objects alone; these differ in bodies or "
-                "joints: name one set of furniture in `objects`, or take engine 'c'"
-            )
-
-
 def _geoms(model: mujoco.MjModel, body: int) -> Int[np.ndarray, " geoms"]:
     return model.body_geomadr[body] + np.arange(model.body_geomnum[body])
 
@@ -113,11 +113,12 @@ def _solid(model: mujoco.MjModel, body: int) -> Int[np.ndarray, " geoms"]:
     return geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]
 
 
-def _differs(scenes: tuple[mujoco.MjModel, ...], body: int) -> bool:
-    """Whether a body's geoms are not the same in all scenes."""
-    first = scenes[0]
-    own = _geoms(first, body)
-    for scene in scenes[1:]:
+def _differs(scenes: tuple[mujoco.MjModel, ...], place: Place) -> bool:
+    """Whether the geoms in a place are not the same in all scenes."""
+    if NONE in place.bodies:
+        return True
+    first, own = scenes[0], _geoms(scenes[0], place.bodies[0])
+    for scene, body in zip(scenes[1:], place.bodies[1:], strict=True):
         other = _geoms(scene, body)
         if len(own) != len(other) or any(
             not np.array_equal(getattr(first, name)[own], getattr(scene, name)[other])
@@ -128,31 +129,37 @@ def _differs(scenes: tuple[mujoco.MjModel, ...], body: int) -> bool:
 
 
 def _add_slots(
-    spec: mujoco.MjSpec, scenes: tuple[mujoco.MjModel, ...], body: int
+    spec: mujoco.MjSpec,
+    scenes: tuple[mujoco.MjModel, ...],
+    place: Place,
+    body: str,
+    index: int,
 ) -> dict[str, list[int]]:
     """Replace a body's geoms by slots.
 
     Returns:
       By the slots' names, the geom of each scene in it; -1: none.
     """
-    element = spec.body(scenes[0].body(body).name)
+    element = spec.body(body)
     for geom in list(element.geoms):
         spec.delete(geom)
     by_type: dict[int, list[list[int]]] = {}
     for number, scene in enumerate(scenes):
         counts: dict[int, int] = {}
-        for geom in _solid(scene, body).tolist():
+        if place.bodies[number] == NONE:
+            continue
+        for geom in _solid(scene, place.bodies[number]).tolist():
             kind = int(scene.geom_type[geom])
             rows = by_type.setdefault(kind, [])
-            place = counts.get(kind, 0)
-            counts[kind] = place + 1
-            if place == len(rows):
-                rows.append([-1] * len(scenes))
-            rows[place][number] = geom
+            order = counts.get(kind, 0)
+            counts[kind] = order + 1
+            if order == len(rows):
+                rows.append([NONE] * len(scenes))
+            rows[order][number] = geom
     slots: dict[str, list[int]] = {}
     for kind, rows in by_type.items():
-        for place, sources in enumerate(rows):
-            name = f"slot_{body}_{kind}_{place}"
+        for order, sources in enumerate(rows):
+            name = f"slot_{index}_{kind}_{order}"
             _add_slot(spec, element, name, kind, sources, scenes)
             slots[name] = sources
     return slots

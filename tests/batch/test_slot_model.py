@@ -31,7 +31,8 @@ def pool():
 def of_row(fields: RowFields, row: int) -> mujoco.MjModel:
     """The model with slots as a start fills it, without what C MuJoCo alone keeps from when it was compiled."""
     model = mujoco.MjModel.__copy__(fields.model)
-    model.geom_sameframe[:] = 0
+    model.geom_sameframe[:] = model.body_sameframe[:] = 0
+    model.body_simple[model.body_dofnum == 1] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     for name, table in fields.fields.items():
         values = table[row]
@@ -88,9 +89,54 @@ def test_starts_of_one_object_have_its_shape_in_every_world(pool):
         np.testing.assert_array_equal(getattr(alone, field), getattr(expected, field))
 
 
-def test_scenes_that_differ_in_more_than_shapes_are_refused(pool):
-    other = draw_pool(
-        EnvConfig("articulated/open_middle_drawer", objects=("cabinet_000",), obs_mode="state"), [0]
+def test_scenes_that_differ_in_more_than_objects_and_furniture_are_refused(pool):
+    text = pool.xml.replace("</worldbody>", '<camera name="another"/></worldbody>')
+    other = mujoco.MjSpec.from_string(text, assets=pool.xml_assets).compile()
+    with pytest.raises(InputError, match="differ in ncam"):
+        slot_model(replace(pool, scenes=(*pool.scenes, other)))
+
+
+@pytest.fixture(scope="module")
+def cabinets():
+    """One with three drawers and a door, one with five drawers, one with three drawers and two doors."""
+    names = ("cabinet_018", "cabinet_010", "cabinet_012")
+    drawn = draw_pool(
+        EnvConfig("articulated/open_middle_drawer", objects=names, obs_mode="state"), range(8)
     )
-    with pytest.raises(InputError, match="differ in bodies or joints"):
-        slot_model(replace(pool, scenes=(*pool.scenes, *other.scenes)))
+    assert len(drawn.scenes) == len(names)
+    assert len({scene.nv for scene in drawn.scenes}) > 1
+    return drawn
+
+
+def test_drawers_and_doors_move_as_in_their_own_scene(cabinets):
+    fields, models = RowFields(cabinets), RowModels(cabinets)
+    for row, start in enumerate(cabinets.starts):
+        places = slot_model(cabinets).places[start.scene]
+        scene = mujoco.MjModel.__copy__(models.at(row))
+        scene.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+        common = of_row(fields, row)
+        own, slots = mujoco.MjData(scene), mujoco.MjData(common)
+        slots.qpos[:], slots.ctrl[:] = fields.states["qpos"][row], fields.states["ctrl"][row]
+        own.qpos[places.angles[places.angles >= 0]] = slots.qpos[places.angles >= 0]
+        own.ctrl[:] = slots.ctrl
+        slots.qvel[9:] = np.where(places.dofs[9:] >= 0, 1.0, 0.0)  # all of them fly open
+        own.qvel[9:] = 1.0
+        mujoco.mj_step(scene, own, 100)
+        mujoco.mj_step(common, slots, 100)
+        present = places.angles >= 0
+        np.testing.assert_allclose(
+            slots.qpos[present], own.qpos[places.angles[present]], rtol=0, atol=1e-9
+        )
+        assert (slots.qpos[~present] == 0).all()
+        assert own.qpos[9:].min() > 0.01
+
+
+def test_measurements_are_taken_from_the_part_in_question(cabinets):
+    fields = RowFields(cabinets)
+    for row, start in enumerate(cabinets.starts):
+        data = mujoco.MjData(of_row(fields, row))
+        data.qpos[:] = fields.states["qpos"][row]
+        mujoco.mj_kinematics(of_row(fields, row), data)
+        found = data.xpos[fields.addresses["bodies"][row]]
+        np.testing.assert_allclose(found, start.measurement.positions, rtol=0, atol=1e-9)
+        assert data.qpos[fields.addresses["openings"][row]] == start.measurement.openings
