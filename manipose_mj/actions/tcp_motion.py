@@ -132,11 +132,15 @@ def euler_rotation(angles: Float[Array, "3"]) -> Float[Array, "3 3"]:
     return xp.stack([xp.stack(row) for row in rows])
 
 
-def euler_angles(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+def euler_angles(rotation: Float[Array, "*b 3 3"]) -> Float[Array, "*b 3"]:
     """The inverse of `euler_rotation`; where the second angle is a right one, the third is zero."""
-    r = rotation
-    across = float(np.hypot(r[0, 0], r[0, 1]))
-    second = np.arctan2(r[0, 2], across)
-    if across < 1e-9:
-        return np.array([np.arctan2(r[2, 1], r[1, 1]), second, 0.0])
-    return np.array([np.arctan2(-r[1, 2], r[2, 2]), second, np.arctan2(-r[0, 1], r[0, 0])])
+    xp, r = namespace(rotation), rotation
+    across = xp.hypot(r[..., 0, 0], r[..., 0, 1])
+    second = xp.atan2(r[..., 0, 2], across)
+    # Single precision tells no angles from what is smaller.
+    singular = across < (1e-9 if r.dtype == np.float64 else 1e-6)
+    first = xp.where(
+        singular, xp.atan2(r[..., 2, 1], r[..., 1, 1]), xp.atan2(-r[..., 1, 2], r[..., 2, 2])
+    )
+    third = xp.where(singular, xp.zeros_like(across), xp.atan2(-r[..., 0, 1], r[..., 0, 0]))
+    return xp.stack([first, second, third], axis=-1)

@@ -83,16 +83,30 @@ class Controller:
           joints: Measured angles [rad].
         """
 
-        def one(memory: Memory, action: Array, joints: Array, lag: Array) -> tuple[Memory, Array]:
-            memory = self._law.begin(memory, action, Arm(joints, lag, self._kinematics))
+        def one(memory: Memory, action: Array, joints: Array, lag: Array) -> Memory:
+            return _single(self._law.begin(memory, action, Arm(joints, lag, self._kinematics)))
 
+        memory = jax.vmap(one)(commands.memory, action, joints, self._lag[rows])
+        return self.hold(commands._replace(memory=memory), rows)
+
+    def hold(
+        self, commands: Commands, rows: Int[Array, " worlds"]
+    ) -> tuple[Commands, Float[Array, "worlds substeps 8"]]:
+        """What arrives in another control step if there is no new action.
+
+        Args:
+          commands: As the last step left them.
+          rows: Of the starts.
+        """
+
+        def one(memory: Memory) -> tuple[Memory, Array]:
             def send(memory: Memory, _: None) -> tuple[Memory, Array]:
                 targets, memory = self._law.targets(memory, self._timestep)
                 return _single(memory), jnp.append(targets, memory.opening).astype(jnp.float32)
 
-            return jax.lax.scan(send, _single(memory), length=self._substeps)
+            return jax.lax.scan(send, memory, length=self._substeps)
 
-        memory, targets = jax.vmap(one)(commands.memory, action, joints, self._lag[rows])
+        memory, targets = jax.vmap(one)(commands.memory)
         if not self._longest:
             return Commands(memory, commands.sent), targets
         sent = jnp.concatenate([commands.sent, targets], axis=1)

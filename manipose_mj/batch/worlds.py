@@ -100,7 +100,10 @@ class Worlds:
         self._simulations = engine.starts()
         self._observer, self._controller = Observer(pool), Controller(pool)
         self.lower, self.upper = self._controller.lower, self._controller.upper
-        self._begin_jit, self._step_jit = jax.jit(self._begin), jax.jit(self._step)
+        self._begin_jit, self._step_jit = (
+            jax.jit(self._begin),
+            jax.jit(self._step, static_argnums=2),
+        )
 
     def reset(self, key: PRNGKeyArray) -> State:
         """Begin an episode in every world, each start of the pool equally often."""
@@ -122,12 +125,18 @@ class Worlds:
             jnp.asarray(self.pool.rows([int(seed) for seed in seeds]), jnp.int32)
         )
 
-    def step(self, state: State, action: Float[Array, "worlds n"]) -> State:
+    def step(self, state: State, action: Float[Array, "worlds n"], hold: int = 1) -> State:
         """Go on by one control step; where an episode ends, the next start of the pool follows.
 
         A world whose action is not finite diverges.
+
+        Args:
+          state: Of all worlds.
+          action: Of each.
+          hold: Control steps for which the servos go where the action sent them, as in evaluations of policies with
+            fewer actions a second. The reward is the last one's.
         """
-        return self._step_jit(state, action)
+        return self._step_jit(state, action, hold)
 
     def rollout(
         self,
@@ -166,7 +175,7 @@ class Worlds:
 
         def one(state: State, own: Array) -> tuple[State, Transition]:
             action = act(state, own)
-            after = self._step_jit(state, action)
+            after = self._step_jit(state, action, 1)
             return after, Transition(
                 action,
                 after.reward,
@@ -246,7 +255,7 @@ class Worlds:
             commands=self._controller.begin(rows, now.joints, now.fingers.sum(-1)),
         )
 
-    def _step(self, state: State, action: Float[Array, "worlds n"]) -> State:
+    def _step(self, state: State, action: Float[Array, "worlds n"], hold: int) -> State:
         layout, rows = self.pool.layout, state.row
         action = jnp.asarray(action, jnp.float32)
         valid = jnp.isfinite(action).all(-1)
@@ -254,43 +263,51 @@ class Worlds:
         commands, targets = self._controller.command(
             state.commands, rows, action, state.measurement.joints
         )
-        simulation, diverged, now = self.engine.advance(state.simulation, rows, targets)
-        diverged = diverged | ~valid
-        now = _choose(diverged, state.measurement, now)
-        scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
-        success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
-        reward = self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode)
-        succeeded = state.succeeded | success
-        count = state.count + 1
-        truncated = (count >= layout.horizon) & ~diverged
-        observation = self._observer.observe(now, rows)
-        going_on = State(
-            observation=observation,
-            final_observation=observation,
-            reward=jnp.where(diverged, 0.0, reward).astype(jnp.float32),
-            terminated=diverged,
-            truncated=truncated,
-            success=success,
-            success_once=succeeded,
-            overflowed=self.engine.overflowed(simulation),
-            row=rows,
-            count=count,
-            succeeded=succeeded,
-            simulation=simulation,
-            measurement=now,
-            commands=commands,
-        )
+        going_on = self._advanced(state._replace(commands=commands, terminated=~valid), targets)
+        if hold > 1:
+
+            def held(state: State, _: None) -> tuple[State, None]:
+                commands, targets = self._controller.hold(state.commands, rows)
+                return self._advanced(state._replace(commands=commands), targets), None
+
+            going_on, _ = jax.lax.scan(held, going_on, length=hold - 1)
+        diverged = going_on.terminated
+        truncated = (going_on.count >= layout.horizon) & ~diverged
+        observation = self._observer.observe(going_on.measurement, rows)
         done = diverged | truncated
         # Where no episode ended, rows are read that are not used: a gather costs less than a branch.
         fresh = self._begin(jnp.where(done, (rows + 1) % len(self.pool.starts), rows))
         return going_on._replace(
             observation=_choose(done, fresh.observation, observation),
+            final_observation=observation,
+            reward=jnp.where(diverged, 0.0, going_on.reward).astype(jnp.float32),
+            truncated=truncated,
+            success_once=going_on.succeeded,
+            overflowed=self.engine.overflowed(going_on.simulation),
             row=fresh.row,
-            count=jnp.where(done, 0, count),
-            succeeded=succeeded & ~done,
-            simulation=_choose(done, fresh.simulation, simulation),
-            measurement=_choose(done, fresh.measurement, now),
-            commands=_choose(done, fresh.commands, commands),
+            count=jnp.where(done, 0, going_on.count),
+            succeeded=going_on.succeeded & ~done,
+            simulation=_choose(done, fresh.simulation, going_on.simulation),
+            measurement=_choose(done, fresh.measurement, going_on.measurement),
+            commands=_choose(done, fresh.commands, going_on.commands),
+        )
+
+    def _advanced(self, state: State, targets: Float[Array, "worlds substeps 8"]) -> State:
+        """One control step later, before anything begins anew; `terminated` says which diverged so far."""
+        layout, rows = self.pool.layout, state.row
+        simulation, diverged, now = self.engine.advance(state.simulation, rows, targets)
+        diverged = diverged | state.terminated
+        now = _choose(diverged, state.measurement, now)
+        scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
+        success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
+        return state._replace(
+            reward=self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode),
+            terminated=diverged,
+            success=success,
+            count=state.count + 1,
+            succeeded=state.succeeded | success,
+            simulation=simulation,
+            measurement=now,
         )
 
 

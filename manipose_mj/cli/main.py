@@ -14,6 +14,7 @@ from manipose_mj.cli import card, demo, demos, doctor, evaluate, render, tasks, 
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.cli.protocol import build_app as build_protocol_app
+from manipose_mj.cli.train import build_app as build_train_app
 from manipose_mj.console.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
@@ -35,6 +36,7 @@ def build_app() -> SubcommandApp:
         demos.build_app(), name="demos", help="Record demonstrations, replay and export them."
     )
     app.command(build_pose_app(), name="pose", help="Train, evaluate and score pose estimators.")
+    app.command(build_train_app(), name="train", help="Learn policies on batched worlds.")
     app.command(
         build_protocol_app(),
         name="protocol",

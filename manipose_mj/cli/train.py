@@ -1,0 +1,95 @@
+"""`manipose train`: learners on batched worlds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+from tyro.extras import SubcommandApp
+
+from manipose_mj.console.process import compile_at_once_on_gpus, one_thread_per_process
+from manipose_mj.errors import InputError
+
+
+def build_app() -> SubcommandApp:
+    """The commands under `manipose train`."""
+    app = SubcommandApp()
+    app.command(name="ppo")(train_ppo)
+    return app
+
+
+def train_ppo(
+    task: Annotated[Positional[str], arg(metavar="TASK")],
+    /,
+    *,
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    worlds: int = 8192,
+    starts: int = 512,
+    seed: int = 0,
+    minutes: float = 8.0,
+    updates: Annotated[int | None, arg(help_behavior_hint="")] = None,
+    until: Annotated[float | None, arg(metavar="SHARE", help_behavior_hint="")] = None,
+    episode: Annotated[float, arg(metavar="SECONDS")] = 12.0,
+    engine: Literal["auto", "c", "warp"] = "auto",
+    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+) -> int:
+    """Learn to open or shut a drawer or door, on the furniture for training, by proximal policy optimisation.
+
+    Writes policy.npz, which evaluate plays, and curve.json.
+
+    Args:
+      task: One of articulated/open_* and close_*.
+      out: Folder to write to; without it ppo/NAME.
+      worlds: At the same time.
+      starts: Episodes that the worlds begin with, drawn once.
+      seed: Of the networks and of what they try.
+      minutes: That the updates may take, compiling included.
+      updates: At most.
+      until: Stop once this share of the episodes succeed, with the noise of exploration.
+      episode: Length of an episode in training.
+      engine: warp, on a GPU; c, on the CPU, far slower; auto, the former where it runs.
+      objects: Furniture instead of the built-in pieces for training: names, asset folders, or folders of them.
+      pool: File with the starts: read if it is there, otherwise written.
+    """
+    one_thread_per_process()
+    compile_at_once_on_gpus()
+    for name, value in (("worlds", worlds), ("starts", starts), ("episode", episode)):
+        if value <= 0:
+            raise InputError(f"--{name} is {value}; expected more than 0")
+    if minutes <= 0 or (updates is not None and updates < 1):
+        raise InputError("--minutes and --updates: expected more than 0")
+    from manipose_mj.batch.making import available_engine
+    from manipose_mj.cli.evaluate import check_names
+    from manipose_mj.console import output
+    from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, train, training_pool
+
+    check_names((task,), objects)
+    config = TrainingConfig(
+        task,
+        worlds=worlds,
+        starts=starts,
+        seed=seed,
+        minutes=minutes,
+        updates=updates,
+        until=until,
+        episode=episode,
+        engine=available_engine(engine),
+        objects=objects or None,
+    )
+    out = out or Path("ppo") / task.rpartition("/")[2]
+    with output.working_on("drawing starts"):
+        drawn = training_pool(config, pool)
+    console = output.standard_error()
+
+    def show(row: dict[str, float]) -> None:
+        console.print(
+            f"{row['seconds']:5.0f} s, {row['actions'] / 1e6:6.2f} M actions: {row['succeeded']:4.0%} of "
+            f"{row['ended']:.0f} episodes succeeded, reward {row['reward']:.3f}, spread {row['spread']:.2f}, "
+            f"overflowed {row['overflowed']:.1%}, diverged {row['diverged']:.0f}"
+        )
+
+    train(config, drawn, out, show)
+    output.standard_output().print(f"policy: {out / POLICY_FILE}", soft_wrap=True)
+    return 0

@@ -1,0 +1,148 @@
+"""A trained policy: its file, and what `manipose evaluate` plays.
+
+manipose evaluate articulated/open_middle_drawer --policy manipose_mj.learning:TrainedPolicy \
+    --policy-args '{"path": "drawer/policy.npz"}' --obs-mode state+pose --control-mode pd_ee_pose --hz 10
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from manipose_mj.errors import InputError
+from manipose_mj.learning import handle_frame
+from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
+from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.storage.cache_file import new_cache_file
+
+_FORMAT, _HEADER = 1, "header"
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training left.
+
+    Attributes:
+      network: Its actor counts.
+      normaliser: Of features.
+      config: Sizes of the network.
+      hz: Actions a second of simulated time.
+      task: Trained on, `"domain/name"`.
+      seed: Of the training.
+    """
+
+    network: ActorCritic
+    normaliser: Normaliser
+    config: NetworkConfig
+    hz: float
+    task: str
+    seed: int
+
+    def save(self, path: Path) -> None:
+        """Write the actor, in half precision, and what is needed to run it."""
+        header = {
+            "format": _FORMAT,
+            "network": dataclasses.asdict(self.config),
+            "hz": self.hz,
+            "task": self.task,
+            "seed": self.seed,
+        }
+        arrays: dict[str, Any] = {
+            f"leaf_{i}": np.asarray(leaf, np.float16)
+            for i, leaf in enumerate(jax.tree.leaves(eqx.filter(self.network.actor, eqx.is_array)))
+        }
+        arrays["mean"], arrays["variance"] = self.normaliser.mean, self.normaliser.variance
+        arrays[_HEADER] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+        with new_cache_file(path) as scratch, scratch.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> Trained:
+        """Read what `save` wrote; the critic is not in it.
+
+        Raises:
+          InputError: There is no such file, or it is none of these.
+        """
+        try:
+            with np.load(path) as file:
+                stored = {name: file[name] for name in file.files}
+            header = json.loads(bytes(stored[_HEADER]))
+            if header["format"] != _FORMAT:
+                raise InputError(f"{path}: format {header['format']}; expected {_FORMAT}")
+            config = NetworkConfig(**header["network"])
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: no trained policy can be read from it ({error})") from None
+        network = ActorCritic(config, key=jax.random.key(0))
+        arrays, fixed = eqx.partition(network.actor, eqx.is_array)
+        leaves = [
+            jnp.asarray(stored[f"leaf_{i}"], jnp.float32)
+            for i in range(len(jax.tree.leaves(arrays)))
+        ]
+        actor = eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), leaves), fixed)
+        return cls(
+            eqx.tree_at(lambda net: net.actor, network, actor),
+            Normaliser(
+                jnp.asarray(stored["mean"]), jnp.asarray(stored["variance"]), jnp.asarray(1.0)
+            ),
+            config,
+            header["hz"],
+            header["task"],
+            header["seed"],
+        )
+
+
+class TrainedPolicy:
+    """Plays the mean action; the same observations give the same actions."""
+
+    def __init__(self, path: str) -> None:
+        """Reads the file.
+
+        Raises:
+          InputError: There is none, or it is no trained policy.
+        """
+        self._trained = trained = Trained.load(Path(path))
+        self.metadata = {"trained on": trained.task, "seed": trained.seed}
+
+        def act(observation: dict[str, jax.Array]) -> jax.Array:
+            seen = trained.normaliser(handle_frame.features(observation))
+            return handle_frame.command(observation, trained.network.actor(seen))
+
+        self._act = jax.jit(act)
+
+    def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
+        """Check that actions mean what they meant in training.
+
+        Raises:
+          InputError: They do not.
+        """
+        mode, hz = handle_frame.CONTROL_MODE, self._trained.hz
+        if action_space.control_mode != mode or abs(action_space.hz - hz) > 1e-6:
+            raise InputError(
+                f"this policy acts in {mode} at {hz:g} Hz; got {action_space.control_mode} at {action_space.hz:g} "
+                f"Hz: add --control-mode {mode} --hz {hz:g}"
+            )
+
+    def infer(self, obs: Mapping[str, Any]) -> dict[str, Any]:
+        """The next action.
+
+        Raises:
+          InputError: The observations lack something that it sees.
+        """
+        missing = [name for name in handle_frame.SEEN if name not in obs]
+        if missing:
+            raise InputError(
+                f"this policy sees {', '.join(missing)}; add --obs-mode {handle_frame.OBS_MODE}, and take a task "
+                "that opens or shuts one drawer or door"
+            )
+        seen = {name: jnp.asarray(obs[name], jnp.float32) for name in handle_frame.SEEN}
+        return {"actions": np.asarray(self._act(seen), float)[None]}

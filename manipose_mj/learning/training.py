@@ -1,0 +1,175 @@
+"""A training: starts of a task, worlds on an engine, updates until the time is up, and a file."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.making import EngineName, available_engine, from_pool
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError
+from manipose_mj.learning import handle_frame
+from manipose_mj.learning.network import NetworkConfig
+from manipose_mj.learning.ppo import Learner, Ppo, PpoConfig, Progress
+from manipose_mj.learning.trained import Trained
+from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.tasks.core.config import EnvConfig, Objects
+
+POLICY_FILE, CURVE_FILE = "policy.npz", "curve.json"
+_AT_ONCE = 4  # updates between looks at the clock
+Row = dict[str, float]
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """What is trained, and for how long.
+
+    Attributes:
+      task: One that opens or shuts a drawer or door.
+      worlds: At the same time.
+      starts: Episodes that the worlds begin with, of the seeds from `first_start` on.
+      first_start: The first of these seeds.
+      seed: Of the networks and of what they try.
+      minutes: That the updates may take, compiling included.
+      updates: At most; None: as many as there is time for.
+      until: Share of the episodes that succeed at their end with which the training stops; None: never.
+      episode: Length of an episode [s], shorter than the task's.
+      engine: Of the physics.
+      objects: Furniture; None: the built-in pieces for training.
+      ppo: How to learn.
+    """
+
+    task: str
+    worlds: int = 8192
+    starts: int = 512
+    first_start: int = 0
+    seed: int = 0
+    minutes: float = 8.0
+    updates: int | None = None
+    until: float | None = None
+    episode: float = 12.0
+    engine: EngineName = "auto"
+    objects: Objects | None = None
+    ppo: PpoConfig = PpoConfig()
+
+
+def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool:
+    """The starts, read from a file if it is there, otherwise drawn and written to it.
+
+    Raises:
+      InputError: The task is none that can be trained, or the file is of another one.
+    """
+    if path is not None and path.exists():
+        pool = StartPool.load(path)
+    else:
+        env_config = EnvConfig(
+            config.task,
+            obs_mode=handle_frame.OBS_MODE,
+            control_mode=handle_frame.CONTROL_MODE,
+            reward_mode="dense",
+            objects=config.objects,
+        )
+        last = config.first_start + config.starts
+        pool = draw_pool(env_config, range(config.first_start, last))
+        if path is not None:
+            pool.save(path)
+    layout = pool.layout
+    modes = (handle_frame.OBS_MODE, handle_frame.CONTROL_MODE, "dense")
+    if (layout.obs_mode, layout.control_mode, layout.reward_mode) != modes or (
+        layout.task != config.task
+    ):
+        raise InputError(f"{path}: its starts are of another task or mode; draw them again")
+    if "handle" not in layout.frames or layout.objects:
+        raise InputError(
+            f"{config.task}: what is trained opens or shuts one drawer or door; choose one of the tasks "
+            "articulated/open_* and close_*"
+        )
+    # Episodes are shorter than the task's, and the friction solver for the last micrometres is left out, which costs
+    # most of the time on a GPU.
+    steps = round(config.episode / (layout.timestep * layout.substeps))
+    for scene in pool.scenes:
+        scene.opt.noslip_iterations = 0
+    return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
+
+
+def train(
+    config: TrainingConfig,
+    pool: StartPool,
+    out: Path,
+    on_progress: Callable[[Row], None] = lambda row: None,
+) -> Trained:
+    """Learn, and write the policy and its curve.
+
+    Args:
+      config: What and how.
+      pool: Its starts.
+      out: Folder to write to.
+      on_progress: Called with each new row of the curve.
+
+    Raises:
+      InputError: The engine cannot run here, or the updates need more worlds.
+    """
+    ppo = config.ppo
+    if config.worlds * ppo.steps < ppo.minibatches:
+        raise InputError(f"{config.worlds} worlds are too few for {ppo.minibatches} minibatches")
+    started = time.monotonic()
+    worlds = from_pool(pool, config.worlds, available_engine(config.engine))
+    learning = Ppo(worlds, handle_frame.features, handle_frame.command, handle_frame.ACTIONS, ppo)
+    learner = learning.begin(jax.random.key(config.seed))
+    rows: list[Row] = []
+    updates, actions = 0, config.worlds * ppo.steps
+    trained = _trained(config, pool, learner)
+    while config.updates is None or updates < config.updates:
+        count = _AT_ONCE if config.updates is None else min(_AT_ONCE, config.updates - updates)
+        learner, progress = learning.improve(learner, count)
+        updates += count
+        row = _row(progress) | {
+            "updates": updates,
+            "actions": updates * actions,
+            "seconds": time.monotonic() - started,
+        }
+        rows.append(row)
+        on_progress(row)
+        trained = _trained(config, pool, learner)
+        _write(out, trained, config, rows)
+        enough = config.until is not None and row["succeeded"] >= config.until
+        if enough or row["seconds"] > 60 * config.minutes:
+            break
+    worlds.close()
+    return trained
+
+
+def _trained(config: TrainingConfig, pool: StartPool, learner: Learner) -> Trained:
+    network = learner.network
+    sizes = NetworkConfig(network.actor.in_size, network.actor.out_size)  # pyright: ignore[reportArgumentType]
+    layout = pool.layout
+    hz = 1 / (config.ppo.hold * layout.substeps * layout.timestep)
+    return Trained(network, learner.normaliser, sizes, round(hz, 6), config.task, config.seed)
+
+
+def _row(progress: Progress) -> Row:
+    """Of some updates: shares of the episodes that ended, and means."""
+    found = {name: np.asarray(values, float) for name, values in progress._asdict().items()}
+    ended = max(found["ended"].sum(), 1.0)
+    shares = ("succeeded", "once", "overflowed")
+    row = {name: found[name].sum() / ended for name in shares}
+    row |= {name: found[name].sum() for name in ("ended", "diverged")}
+    row |= {name: found[name].mean() for name in ("reward", "change", "rate", "spread")}
+    return {name: float(value) for name, value in row.items()}
+
+
+def _write(out: Path, trained: Trained, config: TrainingConfig, rows: list[Row]) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    trained.save(out / POLICY_FILE)
+    said: dict[str, Any] = asdict(config)
+    said["objects"] = None if config.objects is None else [str(each) for each in config.objects]
+    with new_cache_file(out / CURVE_FILE) as scratch:
+        scratch.write_text(json.dumps({"config": said, "rows": rows}, indent=1))
