@@ -39,24 +39,25 @@ class _Names:
     parts: dict[str, str]
 
 
-def draw_pool(config: EnvConfig, seeds: Sequence[int]) -> StartPool:
-    """The starts of these seeds, as `suite.make(config)` begins them.
+def draw_pool(config: EnvConfig, episodes: Sequence[int | EpisodeSpec]) -> StartPool:
+    """The starts of these episodes, as `suite.make(config)` begins them.
 
     Args:
       config: Of the task.
-      seeds: Of episodes; each once.
+      episodes: Their seeds, or what they are, with seeds; each seed once.
 
     Raises:
       InputError: A mode cannot be batched, or the task cannot use the objects.
     """
     _require_batchable(config)
-    if not seeds:
+    if not episodes:
         raise InputError("no seeds: a batch of worlds needs at least one start")
-    environment = suite.make(config, int(seeds[0]))
+    specs = [e if isinstance(e, EpisodeSpec) else EpisodeSpec(seed=int(e)) for e in episodes]
+    environment = suite.make(config, specs[0].seed)
     assert isinstance(environment, TaskEnvironment)
     drawn = _Drawing(environment, config)
-    for seed in seeds:
-        drawn.add(int(seed))
+    for spec in specs:
+        drawn.add(spec)
     environment.close()
     return drawn.pool()
 
@@ -82,9 +83,10 @@ class _Drawing:
         self._xml: tuple[str, dict[str, bytes]] = ("", {})
         self._layout: Layout | None = None
 
-    def add(self, seed: int) -> None:
-        environment = self._environment
-        observation = environment.reset(EpisodeSpec(seed=seed)).observation
+    def add(self, spec: EpisodeSpec) -> None:
+        environment, seed = self._environment, spec.seed
+        assert seed is not None, "an episode of a pool has a seed"
+        observation = environment.reset(spec).observation
         task, physics = environment.task, environment.physics
         names = _Names(task.observed_objects, _part_slots(task.goals))
         self._widen(names, observation)

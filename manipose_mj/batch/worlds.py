@@ -43,6 +43,7 @@ class State(NamedTuple):
       row: Of each world's start in the pool.
       count: Control steps of the present episode.
       succeeded: Whether its goals were met after any of them.
+      streak: After how many of the last ones they were, without a break.
       simulation: The engine's.
       measurement: Of it.
       commands: What the controllers remember.
@@ -59,6 +60,7 @@ class State(NamedTuple):
     row: Int[Array, " worlds"]
     count: Int[Array, " worlds"]
     succeeded: Bool[Array, " worlds"]
+    streak: Int[Array, " worlds"]
     simulation: Physics
     measurement: Measurement
     commands: Commands
@@ -250,6 +252,7 @@ class Worlds:
             row=rows,
             count=jnp.zeros(len(rows), jnp.int32),
             succeeded=never,
+            streak=jnp.zeros(len(rows), jnp.int32),
             simulation=take(self._simulations, rows),
             measurement=now,
             commands=self._controller.begin(rows, now.joints, now.fingers.sum(-1)),
@@ -287,6 +290,7 @@ class Worlds:
             row=fresh.row,
             count=jnp.where(done, 0, going_on.count),
             succeeded=going_on.succeeded & ~done,
+            streak=jnp.where(done, 0, going_on.streak),
             simulation=_choose(done, fresh.simulation, going_on.simulation),
             measurement=_choose(done, fresh.measurement, going_on.measurement),
             commands=_choose(done, fresh.commands, going_on.commands),
@@ -306,6 +310,7 @@ class Worlds:
             success=success,
             count=state.count + 1,
             succeeded=state.succeeded | success,
+            streak=jnp.where(success, state.streak + 1, 0),
             simulation=simulation,
             measurement=now,
         )

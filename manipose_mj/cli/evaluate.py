@@ -49,6 +49,8 @@ def evaluate(
     ] = None,
     estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
     give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
+    engine: Annotated[Literal["c", "warp"] | None, arg(help_behavior_hint="")] = None,
+    worlds: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
 ) -> int:
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
@@ -86,12 +88,14 @@ def evaluate(
         server; by default those of the package's weights.
       estimator_args: Keyword arguments of its factory, as a JSON object.
       give_cad: Give it the mesh of the very object that is seen; the results say so.
+      engine: Play a policy that has a method act in batched worlds: c on the CPU, warp on a GPU.
+      worlds: Of these, by default 256.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.estimators.loading import load_estimator
     from manipose_mj.estimators.settings import chosen_estimator
-    from manipose_mj.evaluation.config import EvaluationConfig
+    from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
     from manipose_mj.evaluation.planner_settings import PlannerSettings
     from manipose_mj.evaluation.policy_settings import PolicySettings
     from manipose_mj.evaluation.protocol.frozen import EPISODES
@@ -115,6 +119,9 @@ def evaluate(
     if policy == BASELINE and given:
         names = ", ".join(name.replace("_", " ") for name in given)
         raise InputError(f"{names}: for a policy only; name one by --policy, or leave them out")
+    if worlds is not None and engine is None:
+        raise InputError("--worlds needs --engine: c or warp")
+    batch = None if engine is None else BatchSettings(engine, 256 if worlds is None else worlds)
     settings = None if policy == BASELINE else PolicySettings(policy, **given)
     record = out / "exchanges" if planner == "llm" else None
     planning = PlannerSettings(planner, model, base_url, replay, instruction, record)
@@ -132,6 +139,7 @@ def evaluate(
         resample=resample,
         planner=planning,
         estimator=chosen_estimator(estimator, estimator_args, give_cad),
+        batch=batch,
     )
     named = check_names(tasks, objects)
     if config.estimator is not None:

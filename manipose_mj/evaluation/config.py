@@ -6,7 +6,7 @@ import hashlib
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,22 @@ from manipose_mj.evaluation.policy_settings import PolicySettings
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """Episodes that run side by side in batched worlds.
+
+    Attributes: engine: `"c"` or `"warp"`; worlds: how many.
+    """
+
+    engine: Literal["c", "warp"]
+    worlds: int = 256
+
+    @property
+    def words(self) -> list[str]:
+        """The options of the command line that say the same."""
+        return ["--engine", self.engine, "--worlds", str(self.worlds)]
 
 
 @dataclass(frozen=True)
@@ -42,6 +58,7 @@ class EvaluationConfig:
       resample: Base seed for other seeds of the protocol's episodes, whose objects, furniture and parts stay.
       planner: Makes the baseline's plans.
       estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
+      batch: Run a policy in batched worlds; None: in the tasks' own environments, one episode a process.
     """
 
     tasks: tuple[str, ...]
@@ -57,6 +74,7 @@ class EvaluationConfig:
     resample: int | None = None
     planner: PlannerSettings = PlannerSettings()
     estimator: EstimatorSettings | None = None
+    batch: BatchSettings | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -76,6 +94,11 @@ class EvaluationConfig:
             raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
         if self.estimator is not None and self.pose != "estimated":
             raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
+        if self.batch is not None:
+            if self.batch.worlds < 1:
+                raise InputError(f"worlds is {self.batch.worlds}; expected at least 1")
+            if self.policy is None:
+                raise InputError("batched worlds play policies; name one by --policy")
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
 
@@ -97,6 +120,13 @@ class EvaluationConfig:
         if self.estimator is not None:
             objects = self.estimator.source
         return {"objects": objects, "furniture": "true"}
+
+    @property
+    def pose_source(self) -> str:
+        """Where object poses come from, as far as the configuration tells."""
+        if self.policy is None:
+            return self.pose
+        return "oracle" if self.policy.sees_true_poses else "none"
 
     @property
     def split(self) -> Split:
@@ -160,6 +190,7 @@ class EvaluationConfig:
             "policy": self.policy and self.policy.identity,
             "planner": self.planner.identity,
             "estimator": self.estimator and self.estimator.identity,
+            "batch": self.batch and dict(vars(self.batch)),
         }
 
     @property
@@ -172,7 +203,7 @@ class EvaluationConfig:
         whose = ["--pose", self.pose, *self.planner.words]
         whose += self.estimator.words if self.estimator is not None else []
         if self.policy is not None:
-            whose = self.policy.words
+            whose = self.policy.words + (self.batch.words if self.batch else [])
         words += ["--episodes", str(self.episodes), *chosen, *whose]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:

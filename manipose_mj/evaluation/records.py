@@ -37,11 +37,12 @@ class EpisodeResult:
       success_at_end: The goal was met when the episode ended.
       failure: A member of `STAGES`, or None on success at the end.
       reason: One line that says what failed; empty on success.
-      translation_error: Symmetric pose error to the goal at the end [m], None where it has no meaning.
+      translation_error: Symmetric pose error to the goal at the end [m], None where it has no meaning or, in batched
+        worlds, was not measured.
       rotation_error: The same for the rotation [rad].
       steps: Control steps taken.
       sim_time: Simulated time [s].
-      max_penetration: Deepest contact over the episode [m].
+      max_penetration: Deepest contact over the episode [m]; None in batched worlds, which do not measure it.
       wall_s: Wall-clock time [s].
       estimate_translation_error: Largest error of an estimate that an object was grasped with [m];
         None for true poses, and where nothing was grasped.
@@ -64,7 +65,7 @@ class EpisodeResult:
     rotation_error: float | None
     steps: int
     sim_time: float
-    max_penetration: float
+    max_penetration: float | None
     wall_s: float
     estimate_translation_error: float | None = None
     estimate_rotation_error: float | None = None

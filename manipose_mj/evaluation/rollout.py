@@ -18,7 +18,7 @@ from manipose_mj.policies.protocol import Decision, Policy, answered_width, chec
 from manipose_mj.tasks.core.environment import TaskEnvironment
 
 SUCCESS_HELD = 0.5  # for how long a goal must hold until `stop="success"` ends an episode [s]
-_ROUNDING = 1e-6  # beyond a limit that counts as at it: policies compute in float32
+ROUNDING = 1e-6  # beyond a limit that counts as at it: policies compute in float32
 
 Observe = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 
@@ -138,7 +138,7 @@ class Rollout:
           observe: Whether the policy decides next.
         """
         bounded = np.clip(action, self._low, self._high)
-        self.outcome.clipped += bool(np.abs(bounded - action).max() > _ROUNDING)
+        self.outcome.clipped += bool(np.abs(bounded - action).max() > ROUNDING)
         target: Any = bounded
         step = None
         hold = self._next_hold()

@@ -280,6 +280,11 @@ def _outcomes(
     config: EvaluationConfig, runner: Runner, episodes: list[tuple[str, int]]
 ) -> Iterator[EpisodeResult]:
     """Results as the episodes end, in any order."""
+    if config.batch is not None:
+        from manipose_mj.evaluation.batched import batched_results  # loads the simulator
+
+        yield from batched_results(config, config.batch, episodes)
+        return
     if config.dask is None and (config.jobs == 1 or len(episodes) <= 1):
         for task, episode in episodes:
             yield run_one(config, runner, task, episode)
@@ -351,7 +356,7 @@ def _crashed(
         episode=episode,
         seed=config.episode_seed(task, episode),
         object="",
-        pose_source=_pose_source(config),
+        pose_source=config.pose_source,
         success_once=False,
         success_at_end=False,
         failure="policy" if of_policy else "physics",
@@ -368,7 +373,7 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
-    settings["pose"] = _pose_source(config)
+    settings["pose"] = config.pose_source
     settings["poses"] = config.poses
     return {
         "tasks": summarize(results),
@@ -377,13 +382,6 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
         "command": config.command,
         **settings,
     }
-
-
-def _pose_source(config: EvaluationConfig) -> str:
-    """Where object poses come from, as far as the configuration tells."""
-    if config.policy is None:
-        return config.pose
-    return "oracle" if config.policy.sees_true_poses else "none"
 
 
 def _json(document: dict[str, Any]) -> bytes:

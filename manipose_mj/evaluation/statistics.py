@@ -65,7 +65,9 @@ def summarize_task(results: Sequence[EpisodeResult]) -> dict[str, Any]:
             r.estimate_translation_error for r in results
         ),
         "median_estimate_rotation_error_rad": _median(r.estimate_rotation_error for r in results),
-        "max_penetration_m": max(r.max_penetration for r in results),
+        "max_penetration_m": max(
+            (r.max_penetration for r in results if r.max_penetration is not None), default=None
+        ),
         "seeds": [r.seed for r in results],
     }
 

@@ -31,7 +31,7 @@ SEEN = (
 # How far from the handle an action can ask the TCP to go, and how far from the grip's rotation [m, rad].
 _REACH, _TILT = 0.15, 0.6
 # How far from where it is the TCP is sent at once [m, rad].
-_STEP, _TURN = 0.08, 0.4
+_STEP, _TURN = 0.12, 0.6
 
 Observation = Mapping[str, Array]
 

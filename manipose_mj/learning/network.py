@@ -18,9 +18,9 @@ class NetworkConfig:
 
     features: int
     actions: int
-    width: int = 256
-    depth: int = 3
-    spread: float = 0.5
+    width: int = 128
+    depth: int = 2
+    spread: float = 0.6
 
 
 class Normaliser(eqx.Module):

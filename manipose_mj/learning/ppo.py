@@ -41,10 +41,10 @@ class PpoConfig:
     longest: Of gradients.
     """
 
-    hold: int = 5
+    hold: int = 10
     steps: int = 16
-    epochs: int = 4
-    minibatches: int = 8
+    epochs: int = 5
+    minibatches: int = 4
     discount: float = 0.97
     trace: float = 0.95
     clip: float = 0.2

@@ -18,6 +18,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from manipose_mj.errors import InputError
 from manipose_mj.learning import handle_frame
@@ -112,12 +113,22 @@ class TrainedPolicy:
         """
         self._trained = trained = Trained.load(Path(path))
         self.metadata = {"trained on": trained.task, "seed": trained.seed}
+        self._act = jax.jit(self.act)
 
-        def act(observation: dict[str, jax.Array]) -> jax.Array:
-            seen = trained.normaliser(handle_frame.features(observation))
-            return handle_frame.command(observation, trained.network.actor(seen))
+    def act(self, observation: Mapping[str, Array]) -> Float[Array, "worlds 7"]:
+        """The actions of many worlds, for `jax.jit`.
 
-        self._act = jax.jit(act)
+        Raises:
+          InputError: The observations lack something that it sees.
+        """
+        missing = [name for name in handle_frame.SEEN if name not in observation]
+        if missing:
+            raise InputError(
+                f"this policy sees {', '.join(missing)}; add --obs-mode {handle_frame.OBS_MODE}, and take a task "
+                "that opens or shuts one drawer or door"
+            )
+        seen = self._trained.normaliser(handle_frame.features(observation))
+        return handle_frame.command(observation, self._trained.network.mean(seen))
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
         """Check that actions mean what they meant in training.
@@ -138,11 +149,9 @@ class TrainedPolicy:
         Raises:
           InputError: The observations lack something that it sees.
         """
-        missing = [name for name in handle_frame.SEEN if name not in obs]
-        if missing:
-            raise InputError(
-                f"this policy sees {', '.join(missing)}; add --obs-mode {handle_frame.OBS_MODE}, and take a task "
-                "that opens or shuts one drawer or door"
-            )
-        seen = {name: jnp.asarray(obs[name], jnp.float32) for name in handle_frame.SEEN}
-        return {"actions": np.asarray(self._act(seen), float)[None]}
+        seen = {
+            name: jnp.asarray(obs[name], jnp.float32)[None]
+            for name in handle_frame.SEEN
+            if name in obs
+        }
+        return {"actions": np.asarray(self._act(seen), float)}

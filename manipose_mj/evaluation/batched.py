@@ -1,0 +1,213 @@
+"""Episodes of a policy in batched worlds: all of a task's side by side, until each has ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.making import available_engine, from_pool
+from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
+from manipose_mj.evaluation.policy_settings import CONTROL_HZ, PolicySettings
+from manipose_mj.evaluation.records import EpisodeResult
+from manipose_mj.evaluation.rollout import ROUNDING, SUCCESS_HELD
+from manipose_mj.policies.loading import load_policy
+from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.poses import Array
+
+_LOOK_EVERY = 5  # actions between looks at whether all episodes have ended
+
+
+@runtime_checkable
+class BatchPolicy(Protocol):
+    """A policy that can act in many worlds at once."""
+
+    def act(self, observation: Mapping[str, Array]) -> Float[Array, "worlds n"]:
+        """Actions of all worlds: a pure function of their observations, for `jax.jit`."""
+        ...
+
+
+@dataclass
+class _Ends:
+    """How the episodes ended, by world.
+
+    Attributes: ended; success; once; diverged; overflowed; steps, control steps until then; clipped, actions.
+    """
+
+    ended: np.ndarray
+    success: np.ndarray
+    once: np.ndarray
+    diverged: np.ndarray
+    overflowed: np.ndarray
+    steps: np.ndarray
+    clipped: np.ndarray
+
+
+def batched_results(
+    config: EvaluationConfig, batch: BatchSettings, episodes: Sequence[tuple[str, int]]
+) -> Iterator[EpisodeResult]:
+    """The results of episodes, by task and index, a batch of worlds after the other.
+
+    Raises:
+      InputError: The policy cannot act in many worlds, its rate does not divide the control steps', or the engine
+        cannot run here.
+    """
+    settings = config.policy
+    assert settings is not None, "batched worlds play policies"
+    policy, hold = _policy(settings), _hold(settings)
+    engine = available_engine(batch.engine)
+    for task in sorted({task for task, _ in episodes}):
+        numbers = [number for name, number in episodes if name == task]
+        specs = [config.episode_spec(task, number) for number in numbers]
+        pool = draw_pool(config.env_config(task), specs)
+        count = min(batch.worlds, len(numbers))
+        worlds = from_pool(pool, count, engine)
+        _tell(policy, worlds, settings, task)
+        for first in range(0, len(numbers), count):
+            rows = list(range(first, min(first + count, len(numbers))))
+            filled = rows + [rows[-1]] * (count - len(rows))
+            started = time.perf_counter()
+            ends = _played(worlds, policy, [pool.seeds[row] for row in filled], settings, hold)
+            wall_s = (time.perf_counter() - started) / len(rows)
+            for world, row in enumerate(rows):
+                name = pool.starts[row].object_name
+                seconds = pool.layout.timestep * pool.layout.substeps
+                yield _result(config, task, numbers[row], name, ends, world, seconds, hold, wall_s)
+        worlds.close()
+
+
+def _policy(settings: PolicySettings) -> BatchPolicy:
+    policy = load_policy(settings.name, settings.arguments)
+    if not isinstance(policy, BatchPolicy):
+        raise InputError(
+            f"--policy {settings.name}: has no method act, which batched worlds ask for all actions at once; leave "
+            "out --engine"
+        )
+    return policy
+
+
+def _hold(settings: PolicySettings) -> int:
+    """For how many control steps an action is held."""
+    hold = round(CONTROL_HZ / settings.hz)
+    if abs(hold * settings.hz - CONTROL_HZ) > 1e-6:
+        raise InputError(f"hz is {settings.hz:g}; batched worlds take a divisor of {CONTROL_HZ:g}")
+    return hold
+
+
+def _tell(policy: Any, worlds: Worlds, settings: PolicySettings, task: str) -> None:
+    """What every policy is told at the start of an episode."""
+    space = ActionSpace(
+        worlds.lower.astype(float),
+        worlds.upper.astype(float),
+        worlds.pool.layout.control_mode,
+        settings.hz,
+    )
+    policy.reset(task=task, instruction="", seed=0, action_space=space)
+
+
+def _played(
+    worlds: Worlds, policy: BatchPolicy, seeds: list[int], settings: PolicySettings, hold: int
+) -> _Ends:
+    """Play until all episodes of these seeds have ended."""
+    horizon = worlds.pool.layout.horizon
+    enough = round(SUCCESS_HELD * CONTROL_HZ) if settings.stop == "success" else horizon + 1
+    several = _several(worlds, policy, hold)
+    state, ends = worlds.at(seeds), _no_ends(worlds.count)
+    taken = 0
+    while not ends.ended.all():
+        state, (looks, clipped) = several(state)
+        for i, (now, over) in enumerate(zip(_unstacked(looks), np.asarray(clipped), strict=True)):
+            steps = (taken + i + 1) * hold
+            playing = ~ends.ended
+            ends.clipped += playing & over
+            held = now["streak"] >= enough
+            ending = playing & (now["terminated"] | now["truncated"] | held)
+            ends.once |= playing & now["success_once"]
+            ends.success = np.where(ending, now["success"] | held, ends.success)
+            ends.diverged = np.where(ending, now["terminated"], ends.diverged)
+            ends.overflowed |= playing & now["overflowed"]
+            early = np.where(held, now["streak"] - enough, 0)
+            ends.steps = np.where(ending, np.minimum(steps, horizon) - early, ends.steps)
+            ends.ended |= ending
+        taken += _LOOK_EVERY
+    return ends
+
+
+_LOOKED_AT = ("terminated", "truncated", "success", "success_once", "overflowed", "streak")
+
+
+def _several(
+    worlds: Worlds, policy: BatchPolicy, hold: int
+) -> Callable[[State], tuple[State, Any]]:
+    """Some actions in one call, with what each led to."""
+
+    def one(state: State, _: None) -> tuple[State, Any]:
+        action = policy.act(state.observation)
+        beyond = jnp.abs(jnp.clip(action, worlds.lower, worlds.upper) - action).max(-1)
+        after = worlds.step(state, action, hold)
+        looks = {name: getattr(after, name) for name in _LOOKED_AT}
+        return after, (looks, beyond > ROUNDING)
+
+    return jax.jit(lambda state: jax.lax.scan(one, state, length=_LOOK_EVERY))
+
+
+def _unstacked(looks: Mapping[str, Array]) -> list[dict[str, np.ndarray]]:
+    arrays = {name: np.asarray(values) for name, values in looks.items()}
+    return [{name: v[i] for name, v in arrays.items()} for i in range(_LOOK_EVERY)]
+
+
+def _no_ends(count: int) -> _Ends:
+    def no() -> np.ndarray:
+        return np.zeros(count, bool)
+
+    return _Ends(no(), no(), no(), no(), no(), np.zeros(count, int), np.zeros(count, int))
+
+
+def _result(
+    config: EvaluationConfig,
+    task: str,
+    episode: int,
+    name: str,
+    ends: _Ends,
+    world: int,
+    control_timestep: float,
+    hold: int,
+    wall_s: float,
+) -> EpisodeResult:
+    steps, success = int(ends.steps[world]), bool(ends.success[world])
+    failure, reason = "timeout", "not done at the time limit"
+    if ends.diverged[world]:
+        failure, reason = "physics", "the simulation diverged"
+    if ends.overflowed[world]:
+        failure, reason = "physics", "the engine had too little room for the contacts"
+        success = False
+    if success:
+        failure, reason = None, ""
+    return EpisodeResult(
+        task=task,
+        episode=episode,
+        seed=config.episode_seed(task, episode),
+        object=name,
+        pose_source=config.pose_source,
+        success_once=bool(ends.once[world]),
+        success_at_end=success,
+        failure=failure,
+        reason=reason,
+        translation_error=None,
+        rotation_error=None,
+        steps=steps,
+        sim_time=round(steps * control_timestep, 6),
+        max_penetration=None,
+        wall_s=wall_s,
+        decisions=-(-steps // hold),
+        clipped_actions=int(ends.clipped[world]),
+    )
