@@ -1,0 +1,103 @@
+"""Policies in batched worlds: the verdicts of the tasks' own environments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Array
+
+from manipose_mj.cli.main import EXIT_INPUT, main
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.batched import batched_results
+from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
+from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.runner import evaluate
+from manipose_mj.learning import handle_frame
+from manipose_mj.poses import invert, vector_to_pose
+
+TASK = "articulated/open_middle_drawer"
+_NEAR, _SHUT = 0.03, 0.03
+
+
+class Puller:
+    """Goes before the handle, to it, shuts the gripper and pulls: a function of the present alone."""
+
+    def reset(self, **episode) -> None: ...
+
+    def act(self, observation: Mapping[str, Array]) -> Array:
+        grip = handle_frame.grip_frame(observation)
+        now = invert(grip) @ vector_to_pose(jnp.asarray(observation["panda/tcp_pose"]))
+        place, turn = now[:, :3, 3], handle_frame.rotation_vector(now[:, :3, :3])
+        aside = jnp.linalg.norm(place[:, :2], axis=-1)
+        before = (aside < _NEAR) & (jnp.linalg.norm(turn, axis=-1) < 0.2)
+        there = before & (jnp.abs(place[:, 2]) < _NEAR)
+        shut = there & (observation["panda/gripper_opening"][:, 0] < _SHUT)
+        forth = jnp.where(shut, -0.8, jnp.where(before, 0.0, -0.7))
+        none = jnp.zeros_like(forth)
+        columns = [none, none, forth, none, none, none, jnp.where(there, -1.0, 1.0)]
+        return handle_frame.command(observation, jnp.stack(columns, axis=-1))
+
+    def infer(self, obs):
+        seen = {name: jnp.asarray(obs[name], jnp.float32)[None] for name in handle_frame.SEEN}
+        return {"actions": np.asarray(self.act(seen), float)}
+
+
+class Alone:
+    """A policy that acts in one world only."""
+
+    def reset(self, **episode) -> None: ...
+
+    def infer(self, obs):
+        return {"actions": np.zeros((1, 8))}
+
+
+def config(out: Path, policy: str, batch: BatchSettings | None, **changes) -> EvaluationConfig:
+    settings = {"obs_mode": "state+pose", "control_mode": "pd_ee_pose", "hz": 5.0}
+    return EvaluationConfig(
+        (TASK,),
+        out,
+        episodes=3,
+        objects=("cabinet_000", "cabinet_003"),
+        policy=PolicySettings(f"tests.evaluation.test_batched:{policy}", **{**settings, **changes}),
+        batch=batch,
+    )
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("stop", ["success", "horizon"])
+def test_verdicts_are_those_of_single_environments(tmp_path, stop):
+    alone = evaluate(config(tmp_path / "alone", "Puller", None, stop=stop))
+    batch = BatchSettings("c", 2)
+    together = evaluate(config(tmp_path / "together", "Puller", batch, stop=stop))
+    assert any(result.success_at_end for result in together)
+    for one, other in zip(alone, together, strict=True):
+        for name in ("seed", "object", "success_once", "success_at_end", "failure", "pose_source"):
+            assert getattr(one, name) == getattr(other, name), name
+        assert abs(one.steps - other.steps) <= 10  # trajectories differ in their last digits
+        assert other.max_penetration is None
+    again = evaluate(config(tmp_path / "together", "Puller", batch, stop=stop), resume=True)
+    assert again == together
+
+
+def test_policies_that_act_in_one_world_and_odd_rates_are_refused(tmp_path):
+    batch = BatchSettings("c", 2)
+    for policy, changes, said in (
+        ("Alone", {}, "has no method act"),
+        ("Puller", {"hz": 7.0}, "a divisor of 50"),
+    ):
+        asked = config(tmp_path, policy, batch, **changes)
+        with pytest.raises(InputError, match=said):
+            list(batched_results(asked, batch, [(TASK, 0)]))
+
+
+def test_worlds_need_an_engine_and_a_policy(tmp_path, capsys):
+    assert main(["evaluate", TASK, "--worlds", "4"]) == EXIT_INPUT
+    assert "--worlds needs --engine" in capsys.readouterr().err
+    assert main(["evaluate", TASK, "--engine", "c"]) == EXIT_INPUT
+    assert "batched worlds play policies" in capsys.readouterr().err
+    with pytest.raises(InputError, match="worlds is 0"):
+        config(tmp_path, "Puller", BatchSettings("c", 0))

@@ -1,0 +1,66 @@
+"""Trainings from a task's name to a file that `manipose evaluate` plays."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from manipose_mj.cli.main import EXIT_INPUT, main
+from manipose_mj.errors import InputError
+from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, training_pool
+
+TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
+
+
+def test_starts_are_kept_in_a_file_with_shorter_episodes_and_no_slip_solver(tmp_path):
+    config = TrainingConfig(TASK, starts=2, objects=PIECES, episode=4.0)
+    pool = training_pool(config, tmp_path / "starts")
+    assert pool.layout.horizon == 200
+    assert {scene.opt.noslip_iterations for scene in pool.scenes} == {0}
+    again = training_pool(config, tmp_path / "starts")
+    assert again.seeds == pool.seeds == (0, 1)
+    other = TrainingConfig("articulated/close_middle_drawer", starts=2, objects=PIECES)
+    with pytest.raises(InputError, match="of another task or mode"):
+        training_pool(other, tmp_path / "starts")
+
+
+def test_tasks_without_a_handle_are_refused():
+    config = TrainingConfig("single_object/target_pose", starts=1, objects=("box_000",))
+    with pytest.raises(InputError, match="opens or shuts one drawer or door"):
+        training_pool(config)
+
+
+def test_bad_numbers_end_in_one_line(capsys):
+    assert main(["train", "ppo", TASK, "--worlds", "0"]) == EXIT_INPUT
+    assert "--worlds is 0" in capsys.readouterr().err
+    assert main(["train", "ppo", "articulated/open_midle_drawer"]) == EXIT_INPUT
+    assert "open_middle_drawer" in capsys.readouterr().err
+
+
+@pytest.mark.full
+def test_a_training_leaves_a_policy_that_evaluate_plays(tmp_path, capsys):
+    words = [
+        "train",
+        "ppo",
+        TASK,
+        "--worlds",
+        "4",
+        "--starts",
+        "2",
+        "--updates",
+        "1",
+        "--engine",
+        "c",
+    ]
+    out, results = tmp_path / "ppo", tmp_path / "results"
+    assert main([*words, "--objects", *PIECES, "--out", str(out)]) == 0
+    rows = json.loads((out / "curve.json").read_text())["rows"]
+    assert rows[-1]["actions"] == 4 * 16
+    words = ["evaluate", TASK, "--objects", PIECES[0], "--episodes", "2", "--out", str(results)]
+    words += ["--policy", "manipose_mj.learning:TrainedPolicy", "--hz", "5"]
+    words += ["--policy-args", json.dumps({"path": str(out / POLICY_FILE)})]
+    words += ["--obs-mode", "state+pose", "--control-mode", "pd_ee_pose"]
+    assert main([*words, "--engine", "c", "--worlds", "2"]) == 0
+    lines = (results / "results.jsonl").read_text().splitlines()
+    assert [json.loads(line)["steps"] for line in lines] == [2000, 2000]
