@@ -8,13 +8,15 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from dm_control import mjcf
+from jaxtyping import Float, Int
 
 from manipose_mj import suite
 from manipose_mj.actions import control_law
 from manipose_mj.batch.measurement import Addresses, measure
 from manipose_mj.batch.starts import Layout, Start, StartPool
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.mjcf.cameras.clouds import geom_instances
 from manipose_mj.mjcf.cameras.ray_camera import camera_id
 from manipose_mj.poses import SymmetryGroup
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -210,12 +212,22 @@ def _start_of(
         measurement=measure(model, data, addresses),
         shapes=_slot_shapes(known, [rows.get(n) for n in layout.objects], doors),
         goals=tuple(_renamed(goal, parts) for goal in task.goals),
+        instances=_instances(environment),
         frames=frames,
         goal_frames=goal_frames,
         constants={name: np.array(observation[name]) for name in layout.constants},
         latency=round(task.start.model.latency / layout.timestep),
         servo_lag=task.robot.servo_lag(physics),
     )
+
+
+def _instances(environment: TaskEnvironment) -> Int[np.ndarray, " geoms"]:
+    """What segmentation calls each geom; 0: nothing of its own."""
+    physics = environment.physics
+    entities = environment.task.scene.instances.values()
+    frames = [mjcf.get_attachment_frame(entity.mjcf_model) for entity in entities]
+    bodies = [int(physics.bind(frame).element_id) for frame in frames]
+    return geom_instances(physics.model.ptr, bodies) + 1
 
 
 def _frames(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.batch.measurement import Measurement
@@ -47,6 +49,20 @@ class Engine(Protocol):
 
     def overflowed(self, physics: Physics) -> Bool[Array, " worlds"]:
         """Whether there was too little room for a world's contacts or constraints since its start."""
+        ...
+
+    def renderer(
+        self, cameras: tuple[str, ...], height: int, width: int, rgb: bool
+    ) -> Callable[[Physics, Int[Array, " worlds"]], tuple[Array, Array, Array | None]]:
+        """What renders cameras: of the simulations and their starts, depth, geoms and colours of all pixels.
+
+        Raises:
+          InputError: The engine cannot.
+        """
+        ...
+
+    def scene_geoms(self, row: int) -> Int[np.ndarray, " geoms"]:
+        """For the geoms that a renderer names, those of the scene of a start; -1: none."""
         ...
 
     def close(self) -> None:

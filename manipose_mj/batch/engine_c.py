@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from manipose_mj.batch.measurement import Measurement
+from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.simulator import Simulator, packed, state_words
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from manipose_mj.poses import Array
+from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 _simulator: Simulator | None = None  # of a worker's process
 
@@ -86,6 +91,41 @@ class CEngine:
 
     def overflowed(self, physics: UInt32[Array, "worlds words"]) -> Bool[Array, " worlds"]:
         return jnp.zeros(len(physics), bool)
+
+    def renderer(
+        self, cameras: tuple[str, ...], height: int, width: int, rgb: bool
+    ) -> Callable[[Array, Array], tuple[Array, Array, None]]:
+        if rgb:
+            raise InputError(
+                "engine 'c' renders depth and segmentation; colours need engine 'warp'"
+            )
+        models, camera = RowModels(self._pool), RayCamera(height, width)
+        pixels = (self._worlds, len(cameras), height, width)
+        shapes = (
+            jax.ShapeDtypeStruct(pixels, jnp.float32),
+            jax.ShapeDtypeStruct(pixels, jnp.int32),
+        )
+
+        def render(physics: Array, rows: Array) -> tuple[np.ndarray, np.ndarray]:
+            depth, geoms = np.zeros(pixels, np.float32), np.zeros(pixels, np.int32)
+            for world, (words, row) in enumerate(
+                zip(np.asarray(physics), np.asarray(rows), strict=True)
+            ):
+                model = models.at(int(row))
+                data = mujoco.MjData(model)
+                write_simulation(model, data, unflatten(model, data, words.view(float)))
+                for i, name in enumerate(cameras):
+                    seen = camera.render(model, data, name)
+                    depth[world, i], geoms[world, i] = seen.depth, seen.geom_id
+            return depth, geoms
+
+        def call(physics: Array, rows: Array) -> tuple[Array, Array, None]:
+            return *jax.pure_callback(render, shapes, physics, rows), None
+
+        return call
+
+    def scene_geoms(self, row: int) -> Int[np.ndarray, " geoms"]:
+        return np.arange(len(self._pool.starts[row].instances))
 
     def close(self) -> None:
         for worker in self._workers:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch import warp_kernels as kernels
 from manipose_mj.batch.measurement import Measurement
+from manipose_mj.batch.render_warp import WarpRenderer
 from manipose_mj.batch.row_fields import Capacity, RowFields
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
@@ -35,19 +36,28 @@ class WarpEngine:
 
     name = "warp"
 
-    def __init__(self, pool: StartPool, worlds: int, capacity: Capacity | None = None) -> None:
+    def __init__(
+        self,
+        pool: StartPool,
+        worlds: int,
+        capacity: Capacity | None = None,
+        *,
+        visual: bool = False,
+    ) -> None:
         """Copies the model to the device and compiles the kernels.
 
         Args:
           pool: Of starts.
           worlds: How many there are.
           capacity: Room for contacts and constraints; None: estimated from the starts.
+          visual: Whether cameras shall see the objects and furniture of several scenes.
 
         Raises:
           InputError: The pool has several scenes that no model can stand for, or the device has too little memory.
         """
         self._pool, self._worlds = pool, worlds
-        self._fields = RowFields(pool)
+        self._fields = RowFields(pool, visual=visual)
+        self._visual = visual or len(pool.scenes) == 1
         model = self._fields.model
         self.capacity = capacity = capacity or self._fields.capacity(worlds)
         self._device = wp.device_from_jax(jax.devices()[0])
@@ -105,6 +115,26 @@ class WarpEngine:
 
     def overflowed(self, physics: Physics) -> Bool[Array, " worlds"]:
         return physics["overflow"] != 0
+
+    def renderer(
+        self, cameras: tuple[str, ...], height: int, width: int, rgb: bool
+    ) -> WarpRenderer:
+        if not self._visual:
+            raise InputError(
+                "these worlds have no visual shapes: make them with visual=True for their cameras"
+            )
+        return WarpRenderer(
+            self._fields.model,
+            self._model,
+            self._data,
+            self._take_starts,
+            cameras,
+            (height, width),
+            rgb,
+        )
+
+    def scene_geoms(self, row: int) -> Int[np.ndarray, " geoms"]:
+        return self._fields.geoms[self._pool.starts[row].scene]
 
     def close(self) -> None:
         wp.clear_jax_callable_graph_cache(self._call)

@@ -34,6 +34,7 @@ def make(
     seeds: Sequence[int] | None = None,
     engine: EngineName = "auto",
     processes: int = 1,
+    visual: bool = False,
     **config: Unpack[EnvOptions],
 ) -> Worlds:
     """Many worlds of a registered task.
@@ -47,6 +48,7 @@ def make(
       engine: `"c"`, MuJoCo on the CPU, bit for bit the task's physics; `"warp"`, MuJoCo Warp on an NVIDIA GPU;
         `"auto"`, the latter where it is.
       processes: Of the engine `c`.
+      visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
         `objects`, `split`, `randomisation`, `sensors`.
 
@@ -57,13 +59,17 @@ def make(
         seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
     require_worlds(worlds)
     chosen = available_engine(engine)
-    return from_pool(
-        draw_pool(EnvConfig(task, **config), list(seeds)), worlds, chosen, processes=processes
-    )
+    pool = draw_pool(EnvConfig(task, **config), list(seeds))
+    return from_pool(pool, worlds, chosen, processes=processes, visual=visual)
 
 
 def from_pool(
-    pool: StartPool | Path, worlds: int, engine: EngineName = "auto", *, processes: int = 1
+    pool: StartPool | Path,
+    worlds: int,
+    engine: EngineName = "auto",
+    *,
+    processes: int = 1,
+    visual: bool = False,
 ) -> Worlds:
     """Many worlds whose starts are drawn already, or were saved in a file; arguments as of `make`.
 
@@ -74,7 +80,7 @@ def from_pool(
     chosen = available_engine(engine)
     if isinstance(pool, Path):
         pool = StartPool.load(pool)
-    return Worlds(pool, _engine(chosen, pool, worlds, processes), worlds)
+    return Worlds(pool, _engine(chosen, pool, worlds, processes, visual), worlds)
 
 
 def require_worlds(worlds: int) -> None:
@@ -107,9 +113,9 @@ def missing_for_warp() -> str:
     return ""
 
 
-def _engine(name: str, pool: StartPool, worlds: int, processes: int) -> Engine:
+def _engine(name: str, pool: StartPool, worlds: int, processes: int, visual: bool) -> Engine:
     if name == "warp":
         from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
 
-        return WarpEngine(pool, worlds)
+        return WarpEngine(pool, worlds, visual=visual)
     return CEngine(pool, worlds, processes=processes)

@@ -11,9 +11,10 @@ from jaxtyping import Int
 
 from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.slot_bodies import ScenePlaces
-from manipose_mj.batch.slot_model import slot_model
+from manipose_mj.batch.slot_model import SlotModel, slot_model
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.mjcf.panda.servos import ServoAddresses
+from manipose_mj.poses import quaternion_to_rotation
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 from manipose_mj.tasks.scene.indices import NOBODY
 
@@ -46,6 +47,7 @@ _FIELDS = (
     "actuator_biasprm",
     "cam_pos",
     "cam_quat",
+    "cam_fovy",
 )
 # What a joint in no scene has: nothing holds it, nothing moves it.
 _UNUSED = {"jnt_range": (-1.0, 1.0), "dof_frictionloss": 0.0}
@@ -71,6 +73,7 @@ class RowFields:
 
     Attributes:
       model: Of the scene, with nothing asleep.
+      geoms: For each scene, which of its geoms the model's are; -1: none.
       fields: Of the model, those that differ.
       static: Of the data, the poses of geoms.
       states: Where each start is.
@@ -78,10 +81,18 @@ class RowFields:
       addresses: Of measurements, by name.
     """
 
-    def __init__(self, pool: StartPool) -> None:
-        """Raises InputError where the pool's scenes differ in more than the shapes of objects."""
-        slots, models = slot_model(pool), RowModels(pool)
-        self.model = _awake(slots.model)
+    def __init__(self, pool: StartPool, *, visual: bool = False) -> None:
+        """Fills the tables.
+
+        Args:
+          pool: Of starts.
+          visual: Whether to keep visual shapes where scenes differ.
+
+        Raises:
+          InputError: The pool's scenes differ in more than objects and furniture.
+        """
+        slots, models = slot_model(pool, visual=visual), RowModels(pool)
+        self.model, self.geoms = _awake(slots.model), slots.geoms
         fields: dict[str, list[np.ndarray]] = {}
         found: dict[str, list[np.ndarray]] = {name: [] for name in (*_STATIC, *_STATES)}
         owners, sizes = [], []
@@ -96,7 +107,8 @@ class RowFields:
             for name, values in _fields_of(model, of_scene, self.model).items():
                 fields.setdefault(name, []).append(values)
             for name, values in slots.fields[start.scene].items():
-                fields.setdefault(name, []).append(values)
+                if visual or name != "geom_rgba":
+                    fields.setdefault(name, []).append(values)
             for name, index, rest in (
                 ("qpos", places.angles, self.model.qpos0),
                 ("qvel", places.dofs, 0.0),
@@ -104,8 +116,8 @@ class RowFields:
             ):
                 found[name].append(np.where(index < 0, rest, getattr(data, name)[index]))
             found["ctrl"].append(np.array(data.ctrl))
-            for name in _STATIC:
-                found[name].append(getattr(data, name)[geoms])
+            for name, values in _geom_poses(slots.model, slots, start.scene, data).items():
+                found[name].append(values)
             owners.append(np.where(geoms < 0, NOBODY, start.addresses.owners[geoms]))
         stacked = {name: np.stack(values) for name, values in fields.items()}
         self.fields = {
@@ -175,6 +187,23 @@ def _fields_of(
         unused = _UNUSED.get(name, getattr(slots, name))
         fields[name] = np.where(absent, unused, own[index])
     return fields
+
+
+def _geom_poses(
+    model: mujoco.MjModel, slots: SlotModel, scene: int, data: mujoco.MjData
+) -> dict[str, np.ndarray]:
+    """Where the geoms of the model with slots are in a scene's state: `_STATIC` by name."""
+    filled, bodies = slots.fields[scene], slots.places[scene].bodies
+    if not filled:
+        return {name: np.array(getattr(data, name)) for name in _STATIC}
+    absent = bodies < 0
+    origin = np.where(absent[:, None], 0.0, data.xpos[bodies])[model.geom_bodyid]
+    turn = np.where(absent[:, None], np.eye(3).ravel(), data.xmat[bodies])[model.geom_bodyid]
+    turn = turn.reshape(-1, 3, 3)
+    # Meshes in slots were compiled again, and have other frames than in their scenes.
+    positions = origin + np.einsum("gij,gj->gi", turn, filled["geom_pos"])
+    rotations = turn @ quaternion_to_rotation(filled["geom_quat"])
+    return {"geom_xpos": positions, "geom_xmat": rotations.reshape(-1, 9)}
 
 
 def _require_robot_first(servos: ServoAddresses, places: ScenePlaces) -> None:

@@ -7,6 +7,7 @@ bodies are left out.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import mujoco
@@ -37,6 +38,7 @@ FIELDS = (
     "geom_pos",
     "geom_quat",
     "geom_margin",
+    "geom_rgba",
 )
 
 
@@ -57,8 +59,12 @@ class SlotModel:
     places: tuple[ScenePlaces, ...]
 
 
-def slot_model(pool: StartPool) -> SlotModel:
+def slot_model(pool: StartPool, *, visual: bool = False) -> SlotModel:
     """The model for all scenes of a pool.
+
+    Args:
+      pool: Of starts.
+      visual: Whether to keep visual shapes.
 
     Raises:
       InputError: The scenes differ in more than bodies, their shapes and joints.
@@ -72,7 +78,8 @@ def slot_model(pool: StartPool) -> SlotModel:
     names = add_missing(spec, scenes, tree)
     changing = [number for number, place in enumerate(tree) if _differs(scenes, place)]
     slots = {
-        number: _add_slots(spec, scenes, tree[number], names[number], number) for number in changing
+        number: _add_slots(spec, scenes, tree[number], names[number], number, visual=visual)
+        for number in changing
     }
     model = spec.compile()
     _copy_options(scenes[0].opt, model.opt)
@@ -134,6 +141,8 @@ def _add_slots(
     place: Place,
     body: str,
     index: int,
+    *,
+    visual: bool,
 ) -> dict[str, list[int]]:
     """Replace a body's geoms by slots.
 
@@ -143,23 +152,24 @@ def _add_slots(
     element = spec.body(body)
     for geom in list(element.geoms):
         spec.delete(geom)
-    by_type: dict[int, list[list[int]]] = {}
-    for number, scene in enumerate(scenes):
-        counts: dict[int, int] = {}
-        if place.bodies[number] == NONE:
+    by_type: dict[tuple[int, bool], list[list[int]]] = {}
+    for number, (scene, own) in enumerate(zip(scenes, place.bodies, strict=True)):
+        if own == NONE:
             continue
-        for geom in _solid(scene, place.bodies[number]).tolist():
-            kind = int(scene.geom_type[geom])
+        counts: Counter[tuple[int, bool]] = Counter()
+        solid = _solid(scene, own)
+        for geom in (_geoms(scene, own) if visual else solid).tolist():
+            kind = int(scene.geom_type[geom]), geom in solid
             rows = by_type.setdefault(kind, [])
-            order = counts.get(kind, 0)
-            counts[kind] = order + 1
+            order = counts[kind]
+            counts[kind] += 1
             if order == len(rows):
                 rows.append([NONE] * len(scenes))
             rows[order][number] = geom
     slots: dict[str, list[int]] = {}
-    for kind, rows in by_type.items():
+    for (kind, solid), rows in by_type.items():
         for order, sources in enumerate(rows):
-            name = f"slot_{index}_{kind}_{order}"
+            name = f"slot_{index}_{kind}_{'solid' if solid else 'visual'}_{order}"
             _add_slot(spec, element, name, kind, sources, scenes)
             slots[name] = sources
     return slots
@@ -186,9 +196,14 @@ def _add_slot(
             mesh = int(other.geom_dataid[source])
             first, count = int(other.mesh_vertadr[mesh]), int(other.mesh_vertnum[mesh])
             vertices = other.mesh_vert[first : first + count]
-            spec.add_mesh(
+            added_mesh = spec.add_mesh(
                 name=_mesh_name(scenes.index(other), source), uservert=vertices.ravel().tolist()
             )
+            if not other.geom_contype[source]:
+                # What is seen need be neither convex nor closed.
+                face, faces = int(other.mesh_faceadr[mesh]), int(other.mesh_facenum[mesh])
+                added_mesh.userface = other.mesh_face[face : face + faces].ravel().tolist()
+                added_mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     shared = {field.removeprefix("geom_"): int(getattr(scene, field)[geom]) for field in _SHARED}
     added = body.add_geom(name=name, type=mujoco.mjtGeom(kind), **shared)
     added.size = scene.geom_size[geom]
@@ -216,13 +231,16 @@ def _filled(
     for geom in np.flatnonzero(np.isin(model.geom_bodyid, changing)):
         source = int(chosen[geom])
         if source < 0:
-            if model.geom_type[geom] == _MESH:
+            if model.geom_type[geom] == _MESH and model.geom_contype[geom]:
                 fields["geom_dataid"][geom] = -1
             fields["geom_margin"][geom] = _EMPTY_MARGIN
+            fields["geom_rgba"][geom, 3] = 0.0
             continue
         for name in FIELDS:
             if name != "geom_dataid":
                 fields[name][geom] = getattr(scene, name)[source]
+        if scene.geom_matid[source] >= 0:
+            fields["geom_rgba"][geom] = scene.mat_rgba[scene.geom_matid[source]]
         if model.geom_type[geom] == _MESH:
             mesh = model.mesh(_mesh_name(number, source)).id
             fields["geom_dataid"][geom] = mesh

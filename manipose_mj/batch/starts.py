@@ -8,7 +8,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from manipose_mj.batch.measurement import Addresses, Measurement
 from manipose_mj.errors import InputError
@@ -71,6 +71,7 @@ class Start:
       measurement: At the start.
       shapes: Of the objects and parts in their slots.
       goals: With the names of the slots.
+      instances: Of the geoms, as segmentation numbers them; 0: none.
       frames: `T_body_frame` of the layout's frames; zeros for those that the episode does not have.
       goal_frames: `T_world_label` of the layout's goals, likewise.
       constants: Observations that the episode does not change.
@@ -87,6 +88,7 @@ class Start:
     measurement: Measurement
     shapes: SceneShapes
     goals: tuple[Goal, ...]
+    instances: Int[np.ndarray, " geoms"]
     frames: Float[np.ndarray, "frames 4 4"]
     goal_frames: Float[np.ndarray, "goals 4 4"]
     constants: dict[str, np.ndarray]

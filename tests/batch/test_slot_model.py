@@ -131,6 +131,21 @@ def test_drawers_and_doors_move_as_in_their_own_scene(cabinets):
         assert own.qpos[9:].min() > 0.01
 
 
+def test_geoms_that_never_move_are_where_their_scene_has_them(cabinets):
+    """MuJoCo Warp is told where they are: it does not place them itself."""
+    fields = RowFields(cabinets)
+    for row in range(len(cabinets.starts)):
+        model = of_row(fields, row)
+        data = mujoco.MjData(model)
+        data.qpos[:] = fields.states["qpos"][row]
+        mujoco.mj_kinematics(model, data)
+        static = model.body_weldid[model.geom_bodyid] == 0
+        for name, table in fields.static.items():
+            np.testing.assert_allclose(
+                table[row][static], getattr(data, name)[static], rtol=0, atol=1e-9
+            )
+
+
 def test_measurements_are_taken_from_the_part_in_question(cabinets):
     fields = RowFields(cabinets)
     for row, start in enumerate(cabinets.starts):

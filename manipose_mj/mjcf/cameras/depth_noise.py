@@ -1,4 +1,4 @@
-"""What a structured-light camera makes of a depth image: pure functions of arrays.
+"""What a structured-light camera makes of a depth image: pure functions of arrays, NumPy's or JAX's.
 
 Figures are the first Kinect's. Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D
 reconstruction and tracking" (3DIMPVT 2012): standard deviations of depth and of edges as functions of
@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
+from manipose_mj.poses import Array, namespace
 
 # The models' hyperbolas end at a right angle, the measurements they fit some degrees before.
 _STEEPEST = np.deg2rad(85.0)
@@ -48,9 +49,7 @@ class StructuredLight:
 KINECT = StructuredLight()
 
 
-def axial_deviation(
-    depth: Float[np.ndarray, "*s"], incidence: Float[np.ndarray, "*s"]
-) -> Float[np.ndarray, "*s"]:
+def axial_deviation(depth: Float[Array, "*s"], incidence: Float[Array, "*s"]) -> Float[Array, "*s"]:
     """Standard deviation of measured depth [m].
 
     Nguyen et al. 2012, equations 2 and 3: quadratic in depth, constant to 60 deg, hyperbolic above.
@@ -59,13 +58,14 @@ def axial_deviation(
       depth: [m].
       incidence: Angle between the surface's normal and the direction to the camera [rad].
     """
+    xp = namespace(depth)
     deviation = 0.0012 + 0.0019 * (depth - 0.4) ** 2
-    incidence = np.minimum(incidence, _STEEPEST)
-    steep = 1e-4 / np.sqrt(np.maximum(depth, 1e-3)) * (incidence / (np.pi / 2 - incidence)) ** 2
-    return deviation + np.where(incidence > np.deg2rad(60.0), steep, 0.0)
+    incidence = xp.minimum(incidence, _STEEPEST)
+    steep = 1e-4 / xp.sqrt(xp.maximum(depth, 1e-3)) * (incidence / (np.pi / 2 - incidence)) ** 2
+    return deviation + xp.where(incidence > np.deg2rad(60.0), steep, 0.0)
 
 
-def lateral_deviation(incidence: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
+def lateral_deviation(incidence: Float[Array, "*s"]) -> Float[Array, "*s"]:
     """Standard deviation of where an edge appears [pixels of the source's focal length].
 
     Nguyen et al. 2012, equation 1; it does not depend on depth.
@@ -73,25 +73,25 @@ def lateral_deviation(incidence: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "
     Args:
       incidence: Angle between the surface's normal and the direction to the camera [rad].
     """
-    incidence = np.minimum(incidence, _STEEPEST)
+    incidence = namespace(incidence).minimum(incidence, _STEEPEST)
     return 0.8 + 0.035 * incidence / (np.pi / 2 - incidence)
 
 
-def quantised(depth: Float[np.ndarray, "*s"], step: float) -> Float[np.ndarray, "*s"]:
+def quantised(depth: Float[Array, "*s"], step: float) -> Float[Array, "*s"]:
     """Depth rounded to whole steps of its inverse [m]; 0 stays 0.
 
     Args:
       depth: [m].
       step: Of the inverse depth [1/m].
     """
-    seen = depth > 0
-    inverse = np.rint(1.0 / np.where(seen, depth, 1.0) / step) * step
-    return np.where(seen, 1.0 / np.maximum(inverse, step), 0.0)
+    xp, seen = namespace(depth), depth > 0
+    inverse = xp.rint(1.0 / xp.where(seen, depth, 1.0) / step) * step
+    return xp.where(seen, 1.0 / xp.maximum(inverse, step), 0.0)
 
 
 def projector_shadow(
-    depth: Float[np.ndarray, "height width"], focal: float, baseline: float
-) -> Bool[np.ndarray, "height width"]:
+    depth: Float[Array, "height width"], focal: float | Float[Array, ""], baseline: float
+) -> Bool[Array, "height width"]:
     """Where the camera sees a surface that the projector does not reach.
 
     A projector at `baseline` along x sees a pixel at its column minus `focal * baseline / depth`;
@@ -102,12 +102,17 @@ def projector_shadow(
       focal: [pixels].
       baseline: [m].
     """
-    seen = depth > 0
-    column = np.arange(depth.shape[1]) - focal * baseline / np.where(seen, depth, 1.0)
-    column = np.where(seen, column, np.inf)
+    xp, seen = namespace(depth), depth > 0
+    column = xp.arange(depth.shape[1]) - focal * baseline / xp.where(seen, depth, 1.0)
+    column = xp.where(seen, column, np.inf)
     # The least column among the pixels to the right.
-    right = np.minimum.accumulate(column[:, ::-1], axis=1)[:, ::-1]
-    nearest = np.concatenate([right[:, 1:], np.full((len(depth), 1), np.inf)], axis=1)
+    if xp is np:
+        right = np.minimum.accumulate(column[:, ::-1], axis=1)[:, ::-1]
+    else:
+        from jax.lax import cummin
+
+        right = cummin(column, axis=1, reverse=True)
+    nearest = xp.concatenate([right[:, 1:], xp.full((len(depth), 1), np.inf)], axis=1)
     return seen & (nearest < column - 0.5)
 
 
@@ -120,13 +125,22 @@ class Measured:
       rows, columns: Of the pixel that each pixel shows: its own, or, beyond an edge, one nearby.
     """
 
-    depth: Float[np.ndarray, "height width"]
-    rows: Int[np.ndarray, "height width"]
-    columns: Int[np.ndarray, "height width"]
+    depth: Float[Array, "height width"]
+    rows: Int[Array, "height width"]
+    columns: Int[Array, "height width"]
 
-    def moved(self, image: np.ndarray) -> np.ndarray:
+    def moved(self, image: Array) -> Array:
         """Another image of the same view, its edges where this sensor sees them."""
         return image[self.rows, self.columns]
+
+
+@dataclass(frozen=True)
+class Draws:
+    """What is drawn for an image: shift `(2, height, width)` and noise, normal; fate, uniform in [0, 1)."""
+
+    shift: Float[Array, "2 height width"]
+    noise: Float[Array, "height width"]
+    fate: Float[Array, "height width"]
 
 
 def measure(
@@ -134,6 +148,27 @@ def measure(
     cosine: Float[np.ndarray, "height width"],
     intrinsics: Intrinsics,
     rng: np.random.Generator,
+    sensor: StructuredLight = KINECT,
+) -> Measured:
+    """The depth image as the sensor reports it, and which pixels its edges show; arguments as of `measure_with`.
+
+    Args:
+      depth: Exact, along the optical axis; 0 where nothing is [m].
+      cosine: Of the angle of incidence.
+      intrinsics: Of the image.
+      rng: Draws the noise.
+      sensor: The sensor's figures.
+    """
+    shape = depth.shape
+    draws = Draws(rng.standard_normal((2, *shape)), rng.standard_normal(shape), rng.random(shape))
+    return measure_with(depth, cosine, intrinsics.fx, draws, sensor)
+
+
+def measure_with(
+    depth: Float[Array, "height width"],
+    cosine: Float[Array, "height width"],
+    focal: float | Float[Array, ""],
+    draws: Draws,
     sensor: StructuredLight = KINECT,
 ) -> Measured:
     """The depth image as the sensor reports it, and which pixels its edges show.
@@ -144,24 +179,25 @@ def measure(
     Args:
       depth: Exact, along the optical axis; 0 where nothing is [m].
       cosine: Of the angle of incidence.
-      intrinsics: Of the image.
-      rng: Draws the noise.
+      focal: Of the image, along x [pixels].
+      draws: The noise.
       sensor: The sensor's figures.
     """
-    shadow = projector_shadow(depth, intrinsics.fx, sensor.baseline)
-    incidence = np.arccos(np.clip(np.where(depth > 0, cosine, 1.0), 0.0, 1.0))
-    lit = np.where(shadow, 0.0, depth)
-    rows, columns = _edges_moved(lit, incidence, intrinsics.fx, sensor.focal, rng)
+    xp = namespace(depth)
+    shadow = projector_shadow(depth, focal, sensor.baseline)
+    incidence = xp.arccos(xp.clip(xp.where(depth > 0, cosine, 1.0), 0.0, 1.0))
+    lit = xp.where(shadow, 0.0, depth)
+    rows, columns = _edges_moved(lit, incidence, focal, sensor.focal, draws.shift)
     depth, incidence = lit[rows, columns], incidence[rows, columns]
     step = sensor.disparity_step * depth**2
     # What the sources measured includes the steps, whose variance is a twelfth of their square.
     variance = axial_deviation(depth, incidence) ** 2 - step**2 / 12
-    noisy = depth + rng.standard_normal(depth.shape) * np.sqrt(np.maximum(variance, 0.0))
+    noisy = depth + draws.noise * xp.sqrt(xp.maximum(variance, 0.0))
     first, last = sensor.grazing
-    failing = np.clip((incidence - first) / (last - first), 0.0, 1.0) + sensor.speckle
+    failing = xp.clip((incidence - first) / (last - first), 0.0, 1.0) + sensor.speckle
     kept = (depth > 0) & (noisy > sensor.near) & (noisy < sensor.far)
-    kept &= rng.random(depth.shape) >= failing
-    steps = quantised(np.where(kept, noisy, 0.0), sensor.disparity_step)
+    kept &= draws.fate >= failing
+    steps = quantised(xp.where(kept, noisy, 0.0), sensor.disparity_step)
     return Measured(steps, rows, columns)
 
 
@@ -177,22 +213,22 @@ def structured_light(
 
 
 def _edges_moved(
-    depth: Float[np.ndarray, "height width"],
-    incidence: Float[np.ndarray, "height width"],
-    focal: float,
+    depth: Float[Array, "height width"],
+    incidence: Float[Array, "height width"],
+    focal: float | Float[Array, ""],
     source_focal: float,
-    rng: np.random.Generator,
-) -> tuple[Int[np.ndarray, "height width"], Int[np.ndarray, "height width"]]:
+    drawn: Float[Array, "2 height width"],
+) -> tuple[Int[Array, "height width"], Int[Array, "height width"]]:
     """Row and column of a pixel nearby where that lies beyond an edge, else of the pixel itself."""
-    height, width = depth.shape
+    xp, (height, width) = namespace(depth), depth.shape
     deviation = lateral_deviation(incidence) * (focal / source_focal)
-    shift = rng.standard_normal((2, height, width)) * deviation
-    row, column = np.indices(depth.shape)
-    rows = np.clip(np.rint(row + shift[0]), 0, height - 1).astype(np.int64)
-    columns = np.clip(np.rint(column + shift[1]), 0, width - 1).astype(np.int64)
+    shift = drawn * deviation
+    row, column = xp.indices(depth.shape)
+    rows = xp.clip(xp.rint(row + shift[0]), 0, height - 1).astype(row.dtype)
+    columns = xp.clip(xp.rint(column + shift[1]), 0, width - 1).astype(row.dtype)
     there = depth[rows, columns]
     # On one surface depth changes by the way times the slope; more is an edge.
-    way = np.hypot(*shift) * np.maximum(depth, there) / focal
-    slope = np.tan(np.minimum(incidence, np.deg2rad(80.0)))
-    edge = (depth == 0) | (there == 0) | (np.abs(there - depth) > _EDGE + 2 * way * slope)
-    return np.where(edge, rows, row), np.where(edge, columns, column)
+    way = xp.hypot(shift[0], shift[1]) * xp.maximum(depth, there) / focal
+    slope = xp.tan(xp.minimum(incidence, np.deg2rad(80.0)))
+    edge = (depth == 0) | (there == 0) | (xp.abs(there - depth) > _EDGE + 2 * way * slope)
+    return xp.where(edge, rows, row), xp.where(edge, columns, column)

@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
+from manipose_mj.poses import Array, namespace
 
 RADIUS = 0.006  # half the window's side, on the surface [m]
 MAX_RADIUS_PX = 6
-_GATE = 1.5  # change of depth, in half window sides, beyond which a neighbour is another surface
-_SOFT = 0.003  # residual from which a neighbour counts half in the second fit [m]
+GATE = 1.5  # change of depth, in half window sides, beyond which a neighbour is another surface
+SOFT = 0.003  # residual from which a neighbour counts half in the second fit [m]
 _RIDGE = 0.02  # pull towards the camera, in pixels' worth of slope, for pixels in a line
 
 
@@ -42,14 +43,14 @@ def depth_normals(
     rows, columns = (g.ravel() for g in np.meshgrid(side, side, indexing="ij"))
     near = padded[pixels[:, :1] + reach + rows, pixels[:, 1:] + reach + columns]  # (n, window)
     own = depth[pixels[:, 0], pixels[:, 1]].astype(np.float32)[:, None]
-    gate = _GATE * max(RADIUS, reach * middle / intrinsics.fx)
+    gate = GATE * max(RADIUS, reach * middle / intrinsics.fx)
     weight = ((near > 0) & (np.abs(near - own) < gate)).astype(np.float32)
     relative = own / np.where(near > 0, near, own)  # inverse depth, in units of the pixel's own
     # Abscissae in pixels keep the normal equations well scaled.
     at = np.stack([columns, rows, np.ones_like(rows)], axis=-1).astype(np.float32)
-    plane = _fit(at, relative, weight)
-    left = (relative - plane @ at.T) * (own / _SOFT)
-    plane = _fit(at, relative, weight * np.exp2(-left * left)).astype(float)
+    plane = fit_planes(at, relative, weight)
+    left = (relative - plane @ at.T) * (own / SOFT)
+    plane = fit_planes(at, relative, weight * np.exp2(-left * left)).astype(float)
     a, b = plane[:, 0] * intrinsics.fx, plane[:, 1] * intrinsics.fy
     x = (pixels[:, 1] - intrinsics.cx) / intrinsics.fx
     y = (pixels[:, 0] - intrinsics.cy) / intrinsics.fy
@@ -58,16 +59,18 @@ def depth_normals(
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
-def _fit(
-    at: Float[np.ndarray, "w 3"],
-    values: Float[np.ndarray, "n w"],
-    weight: Float[np.ndarray, "n w"],
-) -> Float[np.ndarray, "n 3"]:
+def fit_planes(
+    at: Float[Array, "w 3"],
+    values: Float[Array, "*n w"],
+    weight: Float[Array, "*n w"],
+) -> Float[Array, "*n 3"]:
     """Weighted least squares of `values = a x + b y + c`, each row by itself; `at` is `(x, y, 1)`."""
+    xp = namespace(values)
     x, y, _ = at.T
-    xx, xy, yy, sx, sy, total = (weight @ np.stack([x * x, x * y, y * y, x, y, x * 0 + 1], -1)).T
-    vx, vy, v = ((weight * values) @ at).T
-    total = np.maximum(total, 1e-9)
+    sums = weight @ xp.stack([x * x, x * y, y * y, x, y, x * 0 + 1], axis=-1)
+    xx, xy, yy, sx, sy, total = xp.moveaxis(sums, -1, 0)
+    vx, vy, v = xp.moveaxis((weight * values) @ at, -1, 0)
+    total = xp.maximum(total, 1e-9)
     # About the weighted mean the constant drops out, and two unknowns are left.
     mx, my, mv = sx / total, sy / total, v / total
     cxx, cyy = xx / total - mx * mx + _RIDGE, yy / total - my * my + _RIDGE
@@ -76,4 +79,4 @@ def _fit(
     determinant = cxx * cyy - cxy * cxy
     a = (cyy * cxv - cxy * cyv) / determinant
     b = (cxx * cyv - cxy * cxv) / determinant
-    return np.stack([a, b, mv - a * mx - b * my], axis=-1)
+    return xp.stack([a, b, mv - a * mx - b * my], axis=-1)
