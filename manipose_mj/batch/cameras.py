@@ -14,6 +14,7 @@ from manipose_mj.batch.worlds import State, Worlds
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.ray_camera import camera_intrinsics
 from manipose_mj.poses import Array, compose
+from manipose_mj.tasks.scene.indices import FIRST
 
 _OPENCV = np.array([1.0, -1.0, -1.0])  # from MuJoCo's camera axes to OpenCV's
 
@@ -76,7 +77,7 @@ class Cameras:
         self._chosen = np.array([known.index(name) for name in self.names])
         self._render = worlds.engine.renderer(self.names, height, width, rgb)
         models = RowModels(pool)
-        pinholes, far, instances = [], [], []
+        pinholes, far, instances, numbers = [], [], [], []
         for row, start in enumerate(pool.starts):
             model = models.at(row)
             each = [camera_intrinsics(model, name, height, width) for name in self.names]
@@ -84,13 +85,20 @@ class Cameras:
             far.append(float(model.vis.map.zfar * model.stat.extent))
             geoms = worlds.engine.scene_geoms(row)
             instances.append(np.where(geoms < 0, 0, start.instances[geoms]))
+            owners = [start.addresses.owners == FIRST + i for i in range(len(pool.layout.objects))]
+            numbers.append([int(start.instances[own].max(initial=0)) for own in owners])
         self._pinholes = jnp.asarray(pinholes, jnp.float32)
         self._far = jnp.asarray(far, jnp.float32)
         # Nothing, -1, finds the last one, which is none.
         most = max(map(len, instances)) + 1
         padded = [np.pad(each, (0, most - len(each))) for each in instances]
         self._instances = jnp.asarray(np.stack(padded), jnp.int32)
+        self._numbers = jnp.asarray(numbers, jnp.int32).reshape(len(pool.starts), -1)
         self.look = jax.jit(self._look)
+
+    def numbers(self, state: State) -> Int[Array, "worlds objects"]:
+        """The instances of the layout's objects in each world; 0 for those that it does not have."""
+        return self._numbers[state.row]
 
     def _look(self, state: State) -> Images:
         """What they see now; a pure function of the state, jitted as `look`."""

@@ -19,7 +19,8 @@ HEIGHT, WIDTH = 30, 40
 def test_depth_and_segmentation_are_the_cpu_cameras():
     worlds = make(TASK, 2, seeds=(0, 1), objects=OBJECTS, obs_mode="state")
     cameras = batch.Cameras(worlds, ("left", "front"), height=HEIGHT, width=WIDTH)
-    images = cameras.look(worlds.at([0, 1]))
+    state = worlds.at([0, 1])
+    images = cameras.look(state)
     assert images.depth.shape == (2, 2, HEIGHT, WIDTH) and images.rgb is None
     sensors = SensorConfig(height=HEIGHT, width=WIDTH)
     for world, seed in enumerate((0, 1)):
@@ -34,6 +35,7 @@ def test_depth_and_segmentation_are_the_cpu_cameras():
             np.testing.assert_array_equal(
                 images.instance[world, i], np.squeeze(seen[f"segmentation/{name}"])
             )
+        assert (np.asarray(images.instance[world]) == int(cameras.numbers(state)[world, 0])).any()
         assert len(np.unique(images.instance[world])) > 2  # the robot, the object, the rest
         rig = alone.task.sensors._rig
         pose = np.asarray(images.poses[world, 0])
