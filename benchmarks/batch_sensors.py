@@ -21,9 +21,10 @@ import numpy as np
 
 from manipose_mj import batch
 from manipose_mj.assets import catalogue
-from manipose_mj.batch.clouds import noisy_images, object_clouds
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.reaching import estimate_and_choose, grasp_table
+from manipose_mj.batch.perception.cameras import Cameras
+from manipose_mj.batch.perception.clouds import noisy_images, object_clouds
+from manipose_mj.batch.perception.reaching import estimate_and_choose, grasp_table
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.statistics import machine
@@ -53,7 +54,7 @@ def main() -> None:
     worlds = batch.from_pool(pool, arguments.worlds, arguments.engine, visual=True)
     started = time.perf_counter()
     height, width = arguments.size
-    cameras = batch.Cameras(worlds, height=height, width=width, rgb=arguments.rgb)
+    cameras = Cameras(worlds, height=height, width=width, rgb=arguments.rgb)
     state = worlds.reset(jax.random.key(0))
     key = jax.random.key(1)
     numbers = cameras.numbers(state)[:, 0] if pool.layout.objects else jnp.ones(worlds.count, int)

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 from manipose_mj.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from manipose_mj.batch.cameras import Cameras, Images
     from manipose_mj.batch.making import from_pool, make
     from manipose_mj.batch.starts import StartPool
     from manipose_mj.batch.worlds import State, Transition, Worlds
 
-__all__ = ["Cameras", "Images", "StartPool", "State", "Transition", "Worlds", "from_pool", "make"]
+__all__ = ["StartPool", "State", "Transition", "Worlds", "from_pool", "make"]
 
 __getattr__ = lazy_exports(__name__, __file__)

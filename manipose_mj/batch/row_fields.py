@@ -49,8 +49,8 @@ _FIELDS = (
     "cam_quat",
     "cam_fovy",
 )
-# What a joint in no scene has: nothing holds it, nothing moves it.
-_UNUSED = {"jnt_range": (-1.0, 1.0), "dof_frictionloss": 0.0}
+# What a body and its joint have that a scene lacks: nothing holds them, nothing moves them.
+_UNUSED = {"jnt_range": (-1.0, 1.0), "dof_frictionloss": 0.0, "body_gravcomp": 1.0}
 # MuJoCo Warp places geoms that cannot move once, not in every world anew.
 _STATIC = ("geom_xpos", "geom_xmat")
 # Contacts and constraint rows that may come to those of a start: a hand that touches several objects.

@@ -76,6 +76,9 @@ def slot_model(pool: StartPool, *, visual: bool = False) -> SlotModel:
     tree = common_tree(scenes)
     spec = mujoco.MjSpec.from_string(pool.xml, assets=dict(pool.xml_assets))
     names = add_missing(spec, scenes, tree)
+    for name, place in zip(names, tree, strict=True):
+        if NONE in place.bodies:
+            spec.body(name).gravcomp = 1.0  # what no world has does not fall in it
     changing = [number for number, place in enumerate(tree) if _differs(scenes, place)]
     slots = {
         number: _add_slots(spec, scenes, tree[number], names[number], number, visual=visual)

@@ -303,7 +303,7 @@ class Worlds:
         diverged = diverged | state.terminated
         now = _choose(diverged, state.measurement, now)
         scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
-        success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
+        success = jnp.where(diverged, False, self._goals.success(rows, scene, layout.tolerance))
         return state._replace(
             reward=self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode),
             terminated=diverged,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch
+from manipose_mj.batch.perception.cameras import Cameras
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
@@ -18,7 +19,7 @@ HEIGHT, WIDTH = 30, 40
 @pytest.mark.full
 def test_depth_and_segmentation_are_the_cpu_cameras():
     worlds = make(TASK, 2, seeds=(0, 1), objects=OBJECTS, obs_mode="state")
-    cameras = batch.Cameras(worlds, ("left", "front"), height=HEIGHT, width=WIDTH)
+    cameras = Cameras(worlds, ("left", "front"), height=HEIGHT, width=WIDTH)
     state = worlds.at([0, 1])
     images = cameras.look(state)
     assert images.depth.shape == (2, 2, HEIGHT, WIDTH) and images.rgb is None
@@ -49,11 +50,11 @@ def test_depth_and_segmentation_are_the_cpu_cameras():
 def test_what_cannot_be_seen_is_refused_in_one_line():
     worlds = make(TASK, 1, seeds=(0,), objects=("box_000",), obs_mode="state")
     with pytest.raises(InputError, match="left"):
-        batch.Cameras(worlds, ("lift",))
+        Cameras(worlds, ("lift",))
     with pytest.raises(InputError, match="see nothing"):
-        batch.Cameras(worlds, height=0)
+        Cameras(worlds, height=0)
     with pytest.raises(InputError, match="colours need engine 'warp'"):
-        batch.Cameras(worlds, rgb=True)
+        Cameras(worlds, rgb=True)
 
 
 @pytest.mark.full
@@ -68,14 +69,14 @@ def test_worlds_with_different_objects_look_as_on_the_cpu(task, monkeypatch):
     assert len(pool.scenes) == 2
     worlds = [batch.from_pool(pool, 4, "c"), batch.from_pool(pool, 4, "warp", visual=True)]
     size = {"height": HEIGHT, "width": WIDTH}
-    expected, found = (batch.Cameras(w, **size).look(w.at(pool.seeds)) for w in worlds)
+    expected, found = (Cameras(w, **size).look(w.at(pool.seeds)) for w in worlds)
     same = np.asarray(found.instance) == np.asarray(expected.instance)
     assert same.mean() > 0.999
     near = np.abs(np.asarray(found.depth) - np.asarray(expected.depth)) < 1e-3
     assert near.mean() > 0.999
     assert (np.asarray(found.instance) > 0).any(axis=(1, 2, 3)).all()
     with pytest.raises(InputError, match="visual=True"):
-        batch.Cameras(batch.from_pool(pool, 4, "warp"), **size)
-    coloured = batch.Cameras(worlds[1], ("front",), rgb=True, **size).look(worlds[1].at(pool.seeds))
+        Cameras(batch.from_pool(pool, 4, "warp"), **size)
+    coloured = Cameras(worlds[1], ("front",), rgb=True, **size).look(worlds[1].at(pool.seeds))
     assert coloured.rgb.shape == (4, 1, HEIGHT, WIDTH, 3)
     assert np.ptp(np.asarray(coloured.rgb)[0, 0]) > 60

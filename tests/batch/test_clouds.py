@@ -7,8 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from manipose_mj.batch.cameras import Images
-from manipose_mj.batch.clouds import fitted_normals, incidence, noisy_images, object_clouds
+from manipose_mj.batch.perception.cameras import Images
+from manipose_mj.batch.perception.clouds import (
+    fitted_normals,
+    incidence,
+    noisy_images,
+    object_clouds,
+)
 from manipose_mj.mjcf.cameras.depth_noise import Draws, measure_with
 from manipose_mj.mjcf.cameras.depth_normals import depth_normals
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics

@@ -10,7 +10,7 @@ import pytest
 
 from manipose_mj.actions.tcp_solver import TcpSolver, _arm_model
 from manipose_mj.assets import catalogue
-from manipose_mj.batch.reaching import (
+from manipose_mj.batch.perception.reaching import (
     REACHED,
     choose_grasps,
     estimate_and_choose,
@@ -130,7 +130,7 @@ def test_clouds_lead_to_joint_angles(objects, monkeypatch):
     def estimates(model, points, normals, mask, *, key):
         return type("Found", (), {"poses": jnp.asarray(model.poses, jnp.float32)[:, None]})
 
-    monkeypatch.setattr("manipose_mj.batch.reaching.estimate_batch", estimates)
+    monkeypatch.setattr("manipose_mj.batch.perception.reaching.estimate_batch", estimates)
     cloud = jnp.zeros((4, 256, 3))
     found, choice = estimate_and_choose(
         Knows(seen),  # pyright: ignore[reportArgumentType]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.row_fields import RowFields
+from manipose_mj.batch.row_fields import RowFields, _fields_of
 from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.slot_model import slot_model
 from manipose_mj.errors import InputError
@@ -129,6 +129,35 @@ def test_drawers_and_doors_move_as_in_their_own_scene(cabinets):
         )
         assert (slots.qpos[~present] == 0).all()
         assert own.qpos[9:].min() > 0.01
+
+
+def test_an_object_that_a_scene_lacks_stays_where_it_is(pool):
+    """A second free body, which the first scene alone has."""
+    first = pool.scenes[0]
+    text = pool.xml.replace(
+        "</worldbody>",
+        '<body name="more" pos="0 0 9"><freejoint/><geom size="0.1" mass="1"/></body></worldbody>',
+    )
+    more = mujoco.MjSpec.from_string(text, assets=pool.xml_assets).compile()
+    found = slot_model(replace(pool, scenes=(more, *pool.scenes[1:]), xml=text))
+    assert found.model.nq == first.nq + 7
+    body = found.model.body("more").id
+    assert found.places[0].bodies[body] > 0 > found.places[1].bodies[body]
+    fields = _fields_of(
+        pool.scenes[1],
+        {
+            "body": found.places[1].bodies,
+            "jnt": found.places[1].joints,
+            "dof": found.places[1].dofs,
+            "geom": found.geoms[1],
+        },
+        found.model,
+    )
+    model = mujoco.MjModel.__copy__(found.model)
+    model.body_gravcomp[:] = fields["body_gravcomp"]
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 20)
+    assert data.xpos[body, 2] == 9
 
 
 def test_geoms_that_never_move_are_where_their_scene_has_them(cabinets):

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
-from manipose_mj.batch.cameras import Images
+from manipose_mj.batch.perception.cameras import Images
 from manipose_mj.mjcf.cameras.depth_noise import KINECT, Draws, StructuredLight, measure_with
 from manipose_mj.mjcf.cameras.depth_normals import GATE, MAX_RADIUS_PX, RADIUS, SOFT, fit_planes
 from manipose_mj.poses import Array

@@ -1,0 +1,1 @@
+"""What batched worlds see, and the way from there to joint angles."""
