@@ -56,7 +56,7 @@ def test_commands_in_pages_exist():
                 for script in re.findall(r"\bbenchmarks/\w+\.py", line):
                     assert (ROOT / script).is_file(), f"{name(page)} names {script}"
                 found = re.match(
-                    r"\s*manipose ((?:assets |demos |pose |protocol )?[\w-]+)(.*)",
+                    r"\s*manipose ((?:assets |demos |pose |protocol |train )?[\w-]+)(.*)",
                     line.partition("#")[0],
                 )
                 if found is None:
