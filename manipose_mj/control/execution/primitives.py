@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
+from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
@@ -45,6 +46,8 @@ _BIG_SLIP = (0.01, 0.08)
 _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
+# How far beyond the shut place a part is pushed whose place is estimated [m, rad].
+_BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _SETTLE = 0.25  # after letting go [s]
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
@@ -169,10 +172,16 @@ class Primitives:
 
     def _move_part(self, planner: MotionPlanner, step: Step) -> Actions:
         """As far as the hand on the handle can lead it: a push may do the rest."""
-        assert step.opening is not None
+        assert step.opening is not None and self._held is not None
         estimate, planner = self._observe(planner)
         part = estimate.parts[step.subject]
         self._check_held(estimate, step.subject)
+        if self._executor.feels_joints:
+            yield from lead_part(self._executor, planner, step.subject, step.opening)
+            self._held = replace(
+                self._held, pose_tcp=_pose_in_hand(self._executor.observe(), step.subject)
+            )
+            return
         way = way_in_hand(planner, estimate, part, step.opening)
         way = None if way is None else ending_free(planner, part, way)
         if way is None or not leads_enough(way, part, step.opening):
@@ -194,7 +203,10 @@ class Primitives:
             return
         yield from self._executor.close()
         estimate, planner = self._observe(planner)
-        push = push_part(planner, estimate, estimate.parts[name], opening)
+        low = part.joint.range[0]
+        beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
+        aim = opening - beyond if opening <= low else opening
+        push = push_part(planner, estimate, estimate.parts[name], aim)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))

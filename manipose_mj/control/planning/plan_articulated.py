@@ -90,6 +90,16 @@ def part_goal_plans(
         yield from _plans_through(goal, estimate, planner, part)
 
 
+def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:
+    """Plans that open a part, to see what is behind it."""
+    part = estimate.parts[name]
+    low, high = part.joint.range
+    wide_open = low + OPEN_SHARE * (high - low)
+    yield _open(part, wide_open)
+    if part.joint.kind == "hinge" and part.opening > low + AJAR:
+        yield (Step("move_to", name, opening=wide_open),)
+
+
 def is_reached(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:
     """Whether the object is where the goal has it."""
     obj, part = estimate.objects[goal.object], estimate.parts[goal.part]

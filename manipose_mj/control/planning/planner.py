@@ -7,7 +7,12 @@ from typing import Protocol
 
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Plan
-from manipose_mj.control.planning.plan_articulated import PartGoal, is_reached, part_goal_plans
+from manipose_mj.control.planning.plan_articulated import (
+    PartGoal,
+    is_reached,
+    opening_plans,
+    part_goal_plans,
+)
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
@@ -76,6 +81,11 @@ def candidate_plans(
     """
     if planner is not None and in_clutter(goals, estimate):
         yield from candidate_moves(goals, estimate, planner)
+        return
+    unseen = [goal for goal in goals if isinstance(goal, TakenOutGoal) and goal.object not in estimate.objects]
+    if unseen:
+        for plan in opening_plans(unseen[0].part, estimate):
+            yield CandidatePlan(lambda plan=plan: plan)
         return
     for plan in _joined(_plans_of_each(goals, estimate, planner)):
         yield CandidatePlan(lambda plan=plan: plan)

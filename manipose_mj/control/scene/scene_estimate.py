@@ -6,9 +6,7 @@ knows the difference.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -125,29 +123,3 @@ class SceneEstimate:
     def in_hand(self, name: str) -> AttachedObject:
         """An object as the hand holds it now."""
         return self.objects[name].attached_to(self.tcp_pose)
-
-
-class Perception(Protocol):
-    """Where a policy's knowledge comes from.
-
-    Attributes:
-      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
-    """
-
-    sources: Mapping[str, str]
-
-    def reset(self, seed: int) -> None:
-        """Start an episode; `seed` is that of everything random."""
-        ...
-
-    def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
-        """Joint angles [rad] and opening [m], cheap enough for every control step."""
-        ...
-
-    def observe(self) -> SceneEstimate:
-        """An estimate of the whole scene as it is now."""
-        ...
-
-    def hold(self, name: str | None) -> None:
-        """The hand holds this from now on; None: it has let go."""
-        ...

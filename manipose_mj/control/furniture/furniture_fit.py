@@ -1,0 +1,335 @@
+"""From a cloud of furniture and the parts that were sensed in it to its model in boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import Cavity, MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.furniture.boxes import Boxes
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import SymmetryGroup, compose, invert, transform
+
+# How far parts open in the median of the training furniture: of the depth; [rad].
+DRAWER_SHARE = 0.70
+TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
+LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
+_SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
+_AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m, rad]
+_PANEL = 0.018  # thickness [m]
+_WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
+_REAR = 0.03  # behind them [m]
+_SLICE = 0.05  # height of what the body is cut into [m]
+_ALIKE = 0.02  # slices whose sides differ by less are one [m]
+_SLICE_LEAST = 25  # points
+_HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
+_LOOKS = 500
+_TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
+
+
+def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> FurnitureModel:
+    """The model of a piece of furniture.
+
+    Args:
+      cloud: Of it alone.
+      sensed: Its front and parts.
+      category: Such as `"cabinet"`.
+    """
+    pose = _object_pose(cloud, sensed)
+    points = transform(invert(pose), cloud.points)
+    normals = cloud.normals @ pose[:3, :3]
+    shut = [_as_if_shut(part, pose) for part in sensed.parts]
+    bounds = _bounds(points, shut)
+    parts = [
+        _part(number, part, shut, points, normals, bounds, category)
+        for number, part in enumerate(shut)
+    ]
+    return FurnitureModel(pose, _solid(points, parts, bounds), tuple(parts), category)
+
+
+def _object_pose(cloud: SceneCloud, sensed: SensedFurniture) -> Float[np.ndarray, "4 4"]:
+    """`T_world_object`: upright, X out of the front."""
+    # Handles of shut parts know the front better than the body's planes do.
+    ways = [sensed.front]
+    for part in sensed.parts[:6]:
+        way = part.handle[:3, 1] * [1, 1, 0]
+        if part.opening < _AJAR[part.kind] and way @ sensed.front > np.cos(0.1):
+            ways.append(way / np.linalg.norm(way))
+    x = np.median(ways, axis=0) if len(ways) > 2 else sensed.front
+    x = x / np.linalg.norm(x)
+    z = np.array([0.0, 0.0, 1.0])
+    rotation = np.stack([x, np.cross(z, x), z], axis=1)
+    return compose(rotation, np.median(cloud.points, axis=0))
+
+
+class _Shut:
+    """A sensed part in the object frame, as if it were shut.
+
+    Attributes: sensed; kind; opening; axis; origin; handle: `T_object_handle`.
+    """
+
+    def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
+        self.sensed, self.kind = sensed, sensed.kind
+        to_object = invert(pose)
+        axis = to_object[:3, :3] @ sensed.axis
+        self.axis = _snapped(axis / np.linalg.norm(axis))
+        self.origin = transform(to_object, sensed.origin[None])[0]
+        self.opening = sensed.opening if sensed.opening > _AJAR[sensed.kind] else 0.0
+        joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
+        back = _motion(joint, -self.opening)
+        self.handle = back @ to_object @ sensed.handle
+        self.back = back
+
+
+def _as_if_shut(part: SensedPart, pose: Float[np.ndarray, "4 4"]) -> _Shut:
+    return _Shut(part, pose)
+
+
+def _motion(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
+    empty = np.zeros((0, 2, 3))
+    moving = MovingPart("", joint, None, None)
+    return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)
+
+
+def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    nearest = int(np.abs(axis).argmax())
+    if abs(axis[nearest]) < _SNAP:
+        return axis
+    return np.eye(3)[nearest] * np.sign(axis[nearest])
+
+
+def _bounds(points: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]) -> Float[np.ndarray, "2 3"]:
+    """Low and high corner of the body; its front is where the panels of shut parts are."""
+    low, high = np.percentile(points, 0.7, axis=0), np.percentile(points, 99.3, axis=0)
+    fronts = [_panel_place(points, part) for part in shut if part.opening == 0.0]
+    fronts = [front for front in fronts if front is not None]
+    opened = [part for part in shut if part.opening > 0.0]
+    if fronts:
+        high[0] = float(np.median(fronts))
+    if opened:
+        front = high[0] if fronts else max(part.handle[0, 3] - 0.035 for part in opened)
+        high[0] = front
+        body = points[points[:, 0] < front]
+        if len(body) > 200:
+            low = np.percentile(body, 0.7, axis=0)
+            high[1:] = np.percentile(body, 99.3, axis=0)[1:]
+    return np.stack([low, high])
+
+
+def _panel_place(points: Float[np.ndarray, "n 3"], part: _Shut) -> float | None:
+    """Where along X the panel behind a handle is [m]; None where it does not show."""
+    local = points - part.handle[:3, 3]
+    near = (np.abs(local[:, 1:]) < 0.10).all(axis=1) & (local[:, 0] < -0.012)
+    near &= local[:, 0] > -0.09
+    if near.sum() < 30:
+        return None
+    counts, edges = np.histogram(local[near, 0], bins=np.arange(-0.092, -0.008, 0.003))
+    smooth = np.convolve(counts, np.ones(3), mode="same")
+    best = int(smooth.argmax())
+    close = near & (np.abs(local[:, 0] - edges[best] - 0.0015) < 0.006)
+    return float(np.median(local[close, 0]) + part.handle[0, 3])
+
+
+def _part(
+    number: int,
+    part: _Shut,
+    others: Sequence[_Shut],
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    bounds: Float[np.ndarray, "2 3"],
+    category: str,
+) -> PartModel:
+    """One part: its panel is what is nearer to its handle than to those of others."""
+    moved = transform(part.back, points)
+    front = _panel_place(moved, part)
+    if front is None:
+        front = float(bounds[1, 0])
+    panel = _panel(part, others, bounds, front)
+    low, high = panel
+    on = ((moved > low - 0.006) & (moved < high + 0.006)).all(axis=1)
+    handle = handle_label(moved, part.handle, front)
+    held = np.abs(transform(invert(handle.pose), moved)) < handle.extents / 2 + 0.006
+    rows = np.flatnonzero(on | held.all(axis=1))
+    rows = np.random.default_rng(number).permutation(rows)[:_LOOKS]
+    depth = float(bounds[1, 0] - bounds[0, 0])
+    joint = Joint(part.kind, part.origin, part.axis, (0.0, _range(part, depth, category)))
+    name = f"part_{number}"
+    cavity = _cavity(part, panel, bounds, joint.range[1])
+    return PartModel(
+        part=MovingPart(name, joint, handle, cavity),
+        panel=panel,
+        handle=handle_boxes(handle, front),
+        opening=part.opening,
+        confidence=part.sensed.confidence,
+        looks=moved[rows],
+    )
+
+
+def _range(part: _Shut, depth: float, category: str) -> float:
+    """How far the part may open [m or rad]: as is usual."""
+    if part.kind == "slide":
+        return max(DRAWER_SHARE * depth, part.opening)
+    level = abs(part.axis[2]) < 0.7
+    usual = LEVEL_SWING if level else TYPICAL_SWING.get(category, ANY_SWING)
+    return max(usual, part.opening)
+
+
+def _panel(
+    part: _Shut, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"], front: float
+) -> Float[np.ndarray, "2 3"]:
+    """The rectangle between the handles of neighbours, the hinge and the body's sides."""
+    low, high = bounds[0].copy(), bounds[1].copy()
+    own = part.handle[:3, 3]
+    half = _half_handle(part)
+    for other in others:
+        if other is part or other.sensed.confidence < 0.15:
+            continue
+        away = other.handle[:3, 3] - own
+        axis = 2 if abs(away[2]) > abs(away[1]) else 1
+        if abs(away[axis]) < 0.05:
+            continue
+        middle = own[axis] + away[axis] / 2
+        if away[axis] > 0:
+            high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
+        else:
+            low[axis] = max(low[axis], min(middle, own[axis] - half[axis]))
+    if part.kind == "hinge":
+        axis = 1 if abs(part.axis[2]) > 0.7 else 2
+        if part.origin[axis] > own[axis]:
+            high[axis] = part.origin[axis] + 0.006
+        else:
+            low[axis] = part.origin[axis] - 0.006
+    low[0], high[0] = front - _PANEL, front
+    return np.stack([low, high])
+
+
+def _half_handle(part: _Shut) -> Float[np.ndarray, "3"]:
+    return np.abs(part.handle[:3, 0]) * 0.05 + 0.02
+
+
+def _cavity(
+    part: _Shut,
+    panel: Float[np.ndarray, "2 3"],
+    bounds: Float[np.ndarray, "2 3"],
+    most: float,
+) -> Cavity | None:
+    """What may be behind a panel: a guess until it is open."""
+    low, high = panel[0].copy(), panel[1].copy()
+    high[0] = panel[0, 0]
+    if part.kind == "slide":
+        low[0] = high[0] - most
+        low[1:] += _WALL
+        high[1:] -= _WALL
+    else:
+        low[0] = bounds[0, 0] + _REAR
+        low[1:] += _DOOR_WALL
+        high[1:] -= _DOOR_WALL
+    if (high - low < 0.04).any():
+        return None
+    return Cavity((low + high) / 2, high - low, moves_with_part=part.kind == "slide")
+
+
+def handle_label(
+    points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
+) -> PoseLabel:
+    """A handle with its lengths, as far as points show it.
+
+    Args:
+      points: Of the furniture, object frame, its part shut [m].
+      handle: `T_object_handle` as it was estimated.
+      front: Of the panel, along X [m].
+    """
+    local = transform(invert(handle), points)
+    panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
+    standing = local[:, 1] > min(0.5 * panel, -0.006)
+    on = standing & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH) & (local[:, 1] < 0.03)
+    on &= np.abs(local[:, 0]) < 0.35
+    if on.sum() < 12:
+        return PoseLabel(
+            handle[:3, 3], handle[:3, :3], "handle", np.array([0.10, 0.012, 0.012]), _TURNS
+        )
+    along = _run(local[on, 0], 0.025)
+    on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
+    # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
+    across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
+    length = max(along[1] - along[0], 0.012)
+    middle = handle[:3, 3]
+    if length > 0.04:
+        middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
+    depth = 0.012 if length > 0.045 else max(-panel, 0.015)
+    extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
+    if length <= 0.045:
+        # A knob: as wide one way as the other, down to the panel.
+        side = float(np.clip(max(length, across), 0.014, 0.045))
+        extents = np.array([side, depth, side])
+    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS)
+
+
+def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
+    """The run of values around 0 without a gap [m]."""
+    values = np.sort(along)
+    low = high = float(values[np.abs(values).argmin()])
+    for value in values[values > high]:
+        if value - high > gap:
+            break
+        high = float(value)
+    for value in values[values < low][::-1]:
+        if low - value > gap:
+            break
+        low = float(value)
+    return low, high
+
+
+def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
+    """The bar, and what carries it at both ends; a knob is one box. Object frame."""
+    # Handles are along an axis of the front, or nearly so: boxes around them.
+    turn = np.abs(handle.rotation)
+    half = turn @ handle.extents / 2
+    boxes = [np.stack([handle.origin - half, handle.origin + half])]
+    if handle.extents[0] > 0.045:
+        post = turn @ (np.array([0.012, 0.0, handle.extents[2]]) / 2)
+        for sign in (1.0, -1.0):
+            end = handle.origin + sign * handle.rotation[:, 0] * (handle.extents[0] / 2 - 0.006)
+            low, high = end - post, end + post
+            low[0], high[0] = front, handle.origin[0]
+            boxes.append(np.stack([low, high]))
+    else:
+        boxes[0][0, 0] = min(boxes[0][0, 0], front)
+    return np.stack(boxes)
+
+
+def _solid(
+    points: Float[np.ndarray, "n 3"], parts: Sequence[PartModel], bounds: Float[np.ndarray, "2 3"]
+) -> Boxes:
+    """The body in level slices, each from its front to the back: a plinth stays behind the front."""
+    body = (points[:, 0] < bounds[1, 0] + 0.004) & (points[:, 0] > bounds[0, 0] - 0.02)
+    points = points[body]
+    bottom, top = float(points[:, 2].min()), float(bounds[1, 2])
+    count = max(int(np.ceil((top - bottom) / _SLICE)), 1)
+    edges = np.linspace(bottom, top, count + 1)
+    slices: list[np.ndarray] = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        own = points[(points[:, 2] >= low) & (points[:, 2] < high)]
+        if len(own) < _SLICE_LEAST:
+            continue
+        sides = np.percentile(own, [1, 99], axis=0)
+        box = np.array([[bounds[0, 0], sides[0, 1], low], [sides[1, 0], sides[1, 1], high]])
+        # A side that no camera sees does not make a slice narrow.
+        box[0, 1], box[1, 1] = min(box[0, 1], bounds[0, 1]), max(box[1, 1], bounds[1, 1])
+        if bounds[1, 0] - box[1, 0] < 0.04:
+            box[1, 0] = bounds[1, 0]
+        before = slices[-1] if slices else None
+        if before is not None and (np.abs(before - box)[:, :2] < _ALIKE).all():
+            before[:, :2] = np.stack(
+                [np.minimum(before[0, :2], box[0, :2]), np.maximum(before[1, :2], box[1, :2])]
+            )
+            before[1, 2] = high
+        else:
+            slices.append(box)
+    return np.array(slices).reshape(-1, 2, 3)
