@@ -51,6 +51,10 @@ class Executor:
         """Of the arm, as they are [rad]."""
         return self._perception.robot()[0]
 
+    def opening(self) -> float:
+        """Of the gripper, as it is [m]."""
+        return self._perception.robot()[1]
+
     def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
         """Tell the perception which way a part went, world frame [m], and whether it went no further."""
         self._perception.feel(name, path, stopped)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -13,25 +13,31 @@ from manipose_mj.control.grasping.part_motion import PartWay
 from manipose_mj.control.grasping.part_pick import ending_free, way_in_hand
 from manipose_mj.control.motion.batch_ik import forward
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.scene.scene_estimate import PartEstimate
+from manipose_mj.control.scene.collision_query import CONTACT
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 
+# A hand that holds a handle is where the estimate may have the handle itself.
+_HELD = replace(CONTACT, arm=-0.004, target=-0.02)
 _EVERY = 4  # control steps between looks at where the hand is
 _BESIDE = 0.004  # how far the hand may be beside its path before the joint is corrected [m]
 _FIRST = 0.02  # way after which the joint is corrected whatever it is [m]
 _STUCK = 0.030  # how far the hand may stay behind its path [m]
 _STILL = 0.0015  # and move meanwhile, in a quarter of a second [m]
 _PATIENCE = 12  # control steps
+_SLIPPED = 0.003  # change of the gripper's opening with which it loses the handle [m]
 _MOST = 14  # corrections
-_FURTHER = {"slide": 1.25, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
-_ENOUGH = {"slide": 0.6, "hinge": 0.25}  # of it, from which on a stop is the end of the part's range
+_FURTHER = {"slide": 1.35, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
+_ENOUGH = {"slide": 0.35, "hinge": 0.25}  # of it, from which on a stop is the end of the part's range
 
 
 @dataclass
 class _Trace:
-    """Attributes: path: of the TCP, world frame [m]; stopped: whether it went no further."""
+    """Attributes: path: of the TCP, world frame [m]; width: of the gripper on the handle [m]; stopped: whether the
+    part went no further."""
 
     path: list[np.ndarray]
+    width: float
     stopped: bool = False
 
 
@@ -51,7 +57,7 @@ def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: fl
       StageFailure: The hand cannot lead it on, far from the opening.
     """
     estimate = executor.observe()
-    trace = _Trace([_tcp(executor.joints())])
+    trace = _Trace([_tcp(executor.joints())], executor.opening())
     started = estimate.parts[name].opening
     for _ in range(_MOST):
         part = estimate.parts[name]
@@ -73,14 +79,20 @@ def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: fl
         )
 
 
-def _way(planner, estimate, part: PartEstimate, started: float, opening: float) -> PartWay | None:
+def _way(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    started: float,
+    opening: float,
+) -> PartWay | None:
     """As far beyond the opening as a part may go, or as the arm can."""
     beyond = started + _FURTHER[part.joint.kind] * (opening - started)
     if opening <= part.joint.range[0]:
         beyond = opening
     if abs(beyond - part.opening) < 0.01:
         return None
-    way = way_in_hand(planner, estimate, part, beyond)
+    way = way_in_hand(planner, estimate, part, beyond, _HELD)
     return None if way is None else ending_free(planner, part, way)
 
 
@@ -100,6 +112,11 @@ def _follow(executor: Executor, way: PartWay, trace: _Trace) -> Iterator[Action]
         if step % _EVERY:
             continue
         now = _tcp(executor.joints())
+        if abs(executor.opening() - trace.width) > _SLIPPED:
+            # It slips off what goes no further.
+            trace.path = trace.path[:-1] if len(trace.path) > 2 else trace.path
+            trace.stopped = True
+            return False
         trace.path.append(now)
         recent = [*recent, now][-(_PATIENCE // _EVERY) - 1 :]
         beside = float(np.linalg.norm(places[: step + 1] - now, axis=1).min())

@@ -48,6 +48,7 @@ _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
+_OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
@@ -139,7 +140,8 @@ class Primitives:
         yield from self._executor.wait(_SETTLE)
         self._executor.hold(None)
         estimate, planner = self._observe(planner)
-        yield from self._executor.follow(_retreat(planner, estimate, name))
+        near = _OWN_PART if self._executor.feels_joints and name in estimate.parts else None
+        yield from self._executor.follow(_retreat(planner, estimate, name, near))
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -284,9 +286,15 @@ def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> f
 
 
 def _retreat(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str
+    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
 ) -> Float[np.ndarray, "t 7"]:
     """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
+
+    Args:
+      planner: Plans in the scene of the estimate.
+      estimate: What is where.
+      name: Of what was let go.
+      near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
 
     Raises:
       StageFailure: There is no way.
@@ -296,7 +304,7 @@ def _retreat(
     touched = frozenset({planner.body_name(released.body)})
     for allowance in (planner.contact_allowance, *_GIVING_WAY):
         pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances)
+        line = retreat(pushing, estimate, released.geoms, touched, distances, near)
         if line is not None:
             return line
     raise StageFailure("release", f"no way to back off from {name}")

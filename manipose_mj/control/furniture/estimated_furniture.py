@@ -11,7 +11,7 @@ from dm_control import mjcf
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.furniture_fit import fit_furniture
+from manipose_mj.control.furniture.furniture_fit import as_drawer, fit_furniture
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of
 from manipose_mj.control.furniture.opened_part import seen_open
@@ -24,6 +24,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.goals import ShutGoal
 from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
@@ -79,12 +80,33 @@ class EstimatedFurniture:
             if len(seen.points) < _LEAST_POINTS:
                 raise StageFailure("perception", f"no camera sees enough of the {category}")
             pose = self._views.camera_pose(self._physics, self._front_cameras[0])
-            try:
-                sensed = self._sense(seen, pose, key)
-            except InputError as error:
-                raise StageFailure("perception", f"{category}: {error}") from None
-            model = fit_furniture(self._cloud(), sensed, category)
-            self.model = _named(model, asked_parts(self._task))
+            cloud, asked = self._cloud(), asked_parts(self._task)
+            found: list[FurnitureModel] = []
+            # Through all cameras as well where what stands open did not show.
+            for each in (seen, cloud):
+                try:
+                    sensed = self._sense(each, pose, key)
+                except InputError as error:
+                    raise StageFailure("perception", f"{category}: {error}") from None
+                model = fit_furniture(cloud, sensed, category)
+                found.append(_named(model, asked, self._expected_open))
+                parts = {part.name: part.opening for part in found[-1].parts}
+                if all(parts[name] > 0 for name in self._expected_open):
+                    break
+            else:
+                found.reverse()
+            self.model = found[-1]
+
+    @property
+    def _expected_open(self) -> frozenset[str]:
+        """Parts that shall be shut, and not opened before: they stand open."""
+        goals = self._task.goals
+        others = {
+            getattr(goal, "part", None) for goal in goals if not isinstance(goal, ShutGoal)
+        }
+        return frozenset(
+            goal.part for goal in goals if isinstance(goal, ShutGoal) and goal.part not in others
+        )
 
     def part_poses(self) -> dict[str, Float[np.ndarray, "4 4"]]:
         """`T_world_part` of all parts."""
@@ -215,8 +237,15 @@ class EstimatedFurniture:
         return transform(invert(self.model.pose), cloud.points)
 
 
-def _named(model: FurnitureModel, asked: Mapping[str, str]) -> FurnitureModel:
+def _named(
+    model: FurnitureModel, asked: Mapping[str, str], expected_open: frozenset[str]
+) -> FurnitureModel:
     """The parts that words mean called as goals call them; others only where they are sure.
+
+    Args:
+      model: With parts of any names.
+      asked: Words for parts, by the names that goals have.
+      expected_open: Of these names, those of parts that stand open.
 
     Raises:
       StageFailure: There is none.
@@ -224,13 +253,25 @@ def _named(model: FurnitureModel, asked: Mapping[str, str]) -> FurnitureModel:
     parts = list(model.parts)
     for name, words in asked.items():
         free = [i for i, part in enumerate(parts) if part.name not in asked]
-        index = meant_part(words, [Candidate(parts[i].part, parts[i].confidence) for i in free])
+        opened = [i for i in free if parts[i].opening > 0]
+        # What shall be shut stands open.
+        free = opened if name in expected_open and opened else free
+        index = meant_part(words, [_candidate(parts[i]) for i in free])
         if index is None:
             raise StageFailure("perception", f"no camera shows the {words} of the {model.category}")
         chosen = parts[free[index]]
+        if "drawer" in words.split() and chosen.part.joint.kind == "hinge":
+            chosen = as_drawer(chosen)
         parts[free[index]] = replace(chosen, part=replace(chosen.part, name=name))
     kept = [part for part in parts if part.name in asked or part.confidence >= _SURE_PART]
     return replace(model, parts=tuple(kept))
+
+
+def _candidate(part: PartModel) -> Candidate:
+    """How words see it: a drawer's handle is in its middle, a door's near an edge."""
+    low, high = part.panel[:, 1]
+    middle = abs(float(_handle(part).origin[1]) - (low + high) / 2) / max(high - low, 0.01)
+    return Candidate(part.part, part.confidence, 2 * middle)
 
 
 def _inside(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,8 +17,8 @@ from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPa
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import SymmetryGroup, compose, invert, transform
 
-# How far parts open in the median of the training furniture: of the depth; [rad].
-DRAWER_SHARE = 0.70
+# How far parts open in the median of the training furniture: of the depth, [m]; [rad].
+DRAWER_SHARE, TYPICAL_DRAWER = 0.70, 0.32
 TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
 LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
 _SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
@@ -28,7 +29,17 @@ _REAR = 0.03  # behind them [m]
 _SLICE = 0.05  # height of what the body is cut into [m]
 _ALIKE = 0.02  # slices whose sides differ by less are one [m]
 _SLICE_LEAST = 25  # points
+_FACING = 0.6  # cosine between normals of the front and X, at least
+_FACE, _FACE_LEAST = 0.012, 150  # how far points of a panel's plane are from it [m]; points that tell its sides
+_CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
+_FREE_EDGE = 0.05  # of a door, from its handle [m]
+_TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
+_USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
+_STANDING = 0.012  # how far points of a handle are before its panel [m]
 _HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
+_ONE_HINGE = 0.04  # hinges nearer than this are one [m]
+_UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
+_MEET = 0.01  # handles nearer than this are one [m]
 _LOOKS = 500
 _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 
@@ -45,12 +56,34 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     points = transform(invert(pose), cloud.points)
     normals = cloud.normals @ pose[:3, :3]
     shut = [_as_if_shut(part, pose) for part in sensed.parts]
-    bounds = _bounds(points, shut)
+    bounds = _bounds(points, normals, shut)
     parts = [
         _part(number, part, shut, points, normals, bounds, category)
         for number, part in enumerate(shut)
     ]
+    parts = _distinct(parts)
     return FurnitureModel(pose, _solid(points, parts, bounds), tuple(parts), category)
+
+
+def _distinct(parts: list[PartModel]) -> list[PartModel]:
+    """Of parts whose fitted handles meet, or that turn about one hinge, the surest."""
+    kept: list[PartModel] = []
+    for part in sorted(parts, key=lambda part: -part.confidence):
+        low, high = part.handle[0] + [[-_MEET], [_MEET]]
+        meets = [((low < o.handle[0, 1]) & (high > o.handle[0, 0])).all() for o in kept]
+        if not any(meets) and not any(_one_door(part, other) for other in kept):
+            kept.append(part)
+    return kept
+
+
+def _one_door(part: PartModel, other: PartModel) -> bool:
+    """Whether two parts turn about one hinge, at one height."""
+    mine, its = part.part.joint, other.part.joint
+    if mine.kind != "hinge" or its.kind != "hinge" or mine.axis @ its.axis < np.cos(0.2):
+        return False
+    apart = np.cross(mine.origin - its.origin, its.axis)
+    overlap = np.minimum(part.panel[1], other.panel[1]) - np.maximum(part.panel[0], other.panel[0])
+    return float(np.linalg.norm(apart)) < _ONE_HINGE and bool((overlap[1:] > 0.05).all())
 
 
 def _object_pose(cloud: SceneCloud, sensed: SensedFurniture) -> Float[np.ndarray, "4 4"]:
@@ -84,6 +117,7 @@ class _Shut:
         joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
         back = _motion(joint, -self.opening)
         self.handle = back @ to_object @ sensed.handle
+        self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
 
 
@@ -104,10 +138,20 @@ def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     return np.eye(3)[nearest] * np.sign(axis[nearest])
 
 
-def _bounds(points: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]) -> Float[np.ndarray, "2 3"]:
+def _along_axes(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """Along the axes of the body, where that is nearly so."""
+    nearest = np.round(rotation)
+    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > _SNAP:
+        return nearest
+    return rotation
+
+
+def _bounds(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]
+) -> Float[np.ndarray, "2 3"]:
     """Low and high corner of the body; its front is where the panels of shut parts are."""
-    low, high = np.percentile(points, 0.7, axis=0), np.percentile(points, 99.3, axis=0)
-    fronts = [_panel_place(points, part) for part in shut if part.opening == 0.0]
+    low, high = _ends(points)
+    fronts = [_panel_place(points, normals, part) for part in shut if part.opening == 0.0]
     fronts = [front for front in fronts if front is not None]
     opened = [part for part in shut if part.opening > 0.0]
     if fronts:
@@ -117,19 +161,32 @@ def _bounds(points: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]) -> Float[np
         high[0] = front
         body = points[points[:, 0] < front]
         if len(body) > 200:
-            low = np.percentile(body, 0.7, axis=0)
-            high[1:] = np.percentile(body, 99.3, axis=0)[1:]
+            low, ends = _ends(body)
+            high[1:] = ends[1:]
     return np.stack([low, high])
 
 
-def _panel_place(points: Float[np.ndarray, "n 3"], part: _Shut) -> float | None:
+def _ends(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Low and high corner of points, strays left out; what is far away counts as much as what is near [m]."""
+    cells, counts = np.unique(np.floor(points / _CELL).astype(int), axis=0, return_counts=True)
+    middles = (cells[counts >= _CELL_LEAST] + 0.5) * _CELL
+    low, high = np.percentile(middles, [0.4, 99.6], axis=0)
+    return low, high
+
+
+def _panel_place(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], part: _Shut
+) -> float | None:
     """Where along X the panel behind a handle is [m]; None where it does not show."""
-    local = points - part.handle[:3, 3]
-    near = (np.abs(local[:, 1:]) < 0.10).all(axis=1) & (local[:, 0] < -0.012)
+    facing = normals[:, 0] > _FACING
+    local = points[facing] - part.handle[:3, 3]
+    near = (np.abs(local[:, 1:]) < 0.10).all(axis=1) & (local[:, 0] < 0.03)
     near &= local[:, 0] > -0.09
     if near.sum() < 30:
         return None
-    counts, edges = np.histogram(local[near, 0], bins=np.arange(-0.092, -0.008, 0.003))
+    counts, edges = np.histogram(local[near, 0], bins=np.arange(-0.092, 0.034, 0.003))
     smooth = np.convolve(counts, np.ones(3), mode="same")
     best = int(smooth.argmax())
     close = near & (np.abs(local[:, 0] - edges[best] - 0.0015) < 0.006)
@@ -147,13 +204,15 @@ def _part(
 ) -> PartModel:
     """One part: its panel is what is nearer to its handle than to those of others."""
     moved = transform(part.back, points)
-    front = _panel_place(moved, part)
+    turned = normals @ part.back[:3, :3].T
+    front = _panel_place(moved, turned, part)
     if front is None:
         front = float(bounds[1, 0])
     panel = _panel(part, others, bounds, front)
+    panel = _within_face(panel, moved[turned[:, 0] > _FACING], part)
     low, high = panel
     on = ((moved > low - 0.006) & (moved < high + 0.006)).all(axis=1)
-    handle = handle_label(moved, part.handle, front)
+    handle, seen = handle_label(moved, part.handle, front)
     held = np.abs(transform(invert(handle.pose), moved)) < handle.extents / 2 + 0.006
     rows = np.flatnonzero(on | held.all(axis=1))
     rows = np.random.default_rng(number).permutation(rows)[:_LOOKS]
@@ -166,15 +225,29 @@ def _part(
         panel=panel,
         handle=handle_boxes(handle, front),
         opening=part.opening,
-        confidence=part.sensed.confidence,
+        confidence=part.sensed.confidence * (1.0 if seen else _UNSEEN),
         looks=moved[rows],
     )
+
+
+def as_drawer(part: PartModel) -> PartModel:
+    """The same part, known to slide: straight out of the front."""
+    handle, panel = part.part.handle, part.panel
+    assert handle is not None
+    joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, TYPICAL_DRAWER))
+    low, high = panel[0] + [0.0, _WALL, _WALL], panel[1] - [0.0, _WALL, _WALL]
+    low[0], high[0] = panel[0, 0] - TYPICAL_DRAWER, panel[0, 0]
+    cavity = None
+    if (high - low > 0.04).all():
+        cavity = Cavity((low + high) / 2, high - low, moves_with_part=True)
+    return replace(part, part=MovingPart(part.name, joint, handle, cavity), opening=0.0)
 
 
 def _range(part: _Shut, depth: float, category: str) -> float:
     """How far the part may open [m or rad]: as is usual."""
     if part.kind == "slide":
-        return max(DRAWER_SHARE * depth, part.opening)
+        # The rear of what is deep, or stands at an angle, is out of all cameras' sight.
+        return max(DRAWER_SHARE * depth, TYPICAL_DRAWER, part.opening)
     level = abs(part.axis[2]) < 0.7
     usual = LEVEL_SWING if level else TYPICAL_SWING.get(category, ANY_SWING)
     return max(usual, part.opening)
@@ -203,14 +276,35 @@ def _panel(
         axis = 1 if abs(part.axis[2]) > 0.7 else 2
         if part.origin[axis] > own[axis]:
             high[axis] = part.origin[axis] + 0.006
+            edge = own[axis] - half[axis] - _FREE_EDGE
+            low[axis] = low[axis] if own[axis] - low[axis] < _TO_SIDE else max(edge, low[axis])
         else:
             low[axis] = part.origin[axis] - 0.006
+            edge = own[axis] + half[axis] + _FREE_EDGE
+            high[axis] = high[axis] if high[axis] - own[axis] < _TO_SIDE else min(edge, high[axis])
     low[0], high[0] = front - _PANEL, front
     return np.stack([low, high])
 
 
+def _within_face(
+    panel: Float[np.ndarray, "2 3"], points: Float[np.ndarray, "n 3"], part: _Shut
+) -> Float[np.ndarray, "2 3"]:
+    """As much of a panel as its plane has points for: below there may be a plinth, behind the front."""
+    on = np.abs(points[:, 0] - panel[1, 0]) < _FACE
+    on &= ((points > panel[0] - 0.01) & (points < panel[1] + 0.01))[:, 1:].all(axis=1)
+    if on.sum() < _FACE_LEAST:
+        return panel
+    low, high = _ends(points[on])
+    found = panel.copy()
+    own, half = part.handle[:3, 3], _half_handle(part)
+    for axis in (1, 2):
+        found[0, axis] = min(max(panel[0, axis], low[axis] - 0.005), own[axis] - half[axis])
+        found[1, axis] = max(min(panel[1, axis], high[axis] + 0.005), own[axis] + half[axis])
+    return found
+
+
 def _half_handle(part: _Shut) -> Float[np.ndarray, "3"]:
-    return np.abs(part.handle[:3, 0]) * 0.05 + 0.02
+    return np.abs(part.handle[:3, 0]) * 0.05 + 0.01
 
 
 def _cavity(
@@ -237,38 +331,46 @@ def _cavity(
 
 def handle_label(
     points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
-) -> PoseLabel:
-    """A handle with its lengths, as far as points show it.
+) -> tuple[PoseLabel, bool]:
+    """A handle with its lengths, as far as points show it, and whether they do.
 
     Args:
       points: Of the furniture, object frame, its part shut [m].
       handle: `T_object_handle` as it was estimated.
       front: Of the panel, along X [m].
     """
+    if handle[0, 3] < front + _STANDING:
+        handle = handle.copy()
+        handle[0, 3] = front + _USUAL_HEIGHT
     local = transform(invert(handle), points)
     panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
-    standing = local[:, 1] > min(0.5 * panel, -0.006)
+    standing = local[:, 1] > min(panel + _STANDING, -0.006)
     on = standing & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH) & (local[:, 1] < 0.03)
     on &= np.abs(local[:, 0]) < 0.35
     if on.sum() < 12:
-        return PoseLabel(
-            handle[:3, 3], handle[:3, :3], "handle", np.array([0.10, 0.012, 0.012]), _TURNS
-        )
+        usual = np.array([0.10, 0.012, 0.012])
+        return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
     along = _run(local[on, 0], 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
     # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
     across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
     length = max(along[1] - along[0], 0.012)
-    middle = handle[:3, 3]
-    if length > 0.04:
-        middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
-    depth = 0.012 if length > 0.045 else max(-panel, 0.015)
+    # Of the bar, its front shows, and a side.
+    sides = np.percentile(local[on, 2], [8, 92])
+    front_side = float(np.percentile(local[on, 1], 85))
+    middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
+    middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
+    if length > 0.045:
+        middle = middle + handle[:3, 1] * (front_side - 0.005)
+    else:
+        middle = middle + handle[:3, 1] * (front_side + panel) / 2
+    depth = 0.012 if length > 0.045 else max(front_side - panel, 0.015)
     extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
     if length <= 0.045:
         # A knob: as wide one way as the other, down to the panel.
         side = float(np.clip(max(length, across), 0.014, 0.045))
         extents = np.array([side, depth, side])
-    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS)
+    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS), True
 
 
 def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:

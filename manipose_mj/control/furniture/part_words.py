@@ -12,6 +12,7 @@ from manipose_mj.tasks.articulated.part_choice import kind_of, rows_of
 from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
 
 _OTHER_KIND = 1.5  # what a wrong kind costs, in places
+_LOOKS = 1.0  # and a handle that is where the other kind has it
 _DOUBT = 1.0  # what no confidence costs, in places
 _LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
 _FITS = 1.0  # places off, below which words fit
@@ -20,10 +21,12 @@ _SHARE = 2.0  # how many places the whole height, or width, counts for
 
 @dataclass(frozen=True)
 class Candidate:
-    """A part that was found. Attributes: part; confidence."""
+    """A part that was found. Attributes: part; confidence; beside: how far its handle is from its panel's middle, of
+    half its width."""
 
     part: MovingPart
     confidence: float
+    beside: float = 0.5
 
 
 def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
@@ -39,18 +42,18 @@ def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
     for least in _LEAST:
         chosen = [i for i, candidate in enumerate(candidates) if candidate.confidence >= least]
         parts = [candidates[i].part for i in chosen]
-        costs = [_cost(words, parts, part) for part in parts]
         costs = [
-            cost + _DOUBT * (1 - candidates[i].confidence)
-            for cost, i in zip(costs, chosen, strict=True)
+            _cost(words, parts, candidates[i]) + _DOUBT * (1 - candidates[i].confidence)
+            for i in chosen
         ]
         if costs and (min(costs) < _FITS or least == _LEAST[-1]):
             return chosen[int(np.argmin(costs))]
     return None
 
 
-def _cost(words: str, parts: Sequence[MovingPart], part: MovingPart) -> float:
+def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> float:
     """How far a part is from what words say, in places."""
+    part = candidate.part
     noun = "drawer" if "drawer" in words.split() else "door"
     wrong = (kind_of(part) == "drawer") != (noun == "drawer")
     alike = [p for p in parts if (kind_of(p) == "drawer") == (noun == "drawer")] or list(parts)
@@ -70,7 +73,9 @@ def _cost(words: str, parts: Sequence[MovingPart], part: MovingPart) -> float:
     column_cost = _place_cost(
         words, ("left", "middle", "right"), column, len(beside), _from_left(part), across
     )
-    return wrong * _OTHER_KIND + row_cost + column_cost
+    # What a part is taken for may be wrong; where its handle is says as much.
+    looks = candidate.beside if noun == "drawer" else 1 - candidate.beside
+    return wrong * (_OTHER_KIND + _LOOKS * looks) + row_cost + column_cost
 
 
 def _place_cost(
