@@ -28,7 +28,10 @@ _PATIENCE = 12  # control steps
 _SLIPPED = 0.003  # change of the gripper's opening with which it loses the handle [m]
 _MOST = 14  # corrections
 _FURTHER = {"slide": 1.35, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
-_ENOUGH = {"slide": 0.35, "hinge": 0.25}  # of it, from which on a stop is the end of the part's range
+_ENOUGH = {
+    "slide": 0.35,
+    "hinge": 0.25,
+}  # of it, from which on a stop is the end of the part's range
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-Boxes = Float[np.ndarray, "n 2 3"]
+Boxes = Float[np.ndarray, "_ 2 3"]
 _THIN = 0.002  # what is no thicker is left out [m]
 
 

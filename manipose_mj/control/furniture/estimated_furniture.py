@@ -101,9 +101,7 @@ class EstimatedFurniture:
     def _expected_open(self) -> frozenset[str]:
         """Parts that shall be shut, and not opened before: they stand open."""
         goals = self._task.goals
-        others = {
-            getattr(goal, "part", None) for goal in goals if not isinstance(goal, ShutGoal)
-        }
+        others = {getattr(goal, "part", None) for goal in goals if not isinstance(goal, ShutGoal)}
         return frozenset(
             goal.part for goal in goals if isinstance(goal, ShutGoal) and goal.part not in others
         )

@@ -10,12 +10,12 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.boxes import Boxes
+from manipose_mj.control.furniture.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
-from manipose_mj.poses import SymmetryGroup, compose, invert, transform
+from manipose_mj.poses import compose, invert, transform
 
 # How far parts open in the median of the training furniture: of the depth, [m]; [rad].
 DRAWER_SHARE, TYPICAL_DRAWER = 0.70, 0.32
@@ -26,22 +26,16 @@ _AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m,
 _PANEL = 0.018  # thickness [m]
 _WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
 _REAR = 0.03  # behind them [m]
-_SLICE = 0.05  # height of what the body is cut into [m]
-_ALIKE = 0.02  # slices whose sides differ by less are one [m]
-_SLICE_LEAST = 25  # points
 _FACING = 0.6  # cosine between normals of the front and X, at least
-_FACE, _FACE_LEAST = 0.012, 150  # how far points of a panel's plane are from it [m]; points that tell its sides
-_CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
+# How far points of a panel's plane are from it [m]; points that tell its sides.
+_FACE, _FACE_LEAST = 0.012, 150
 _FREE_EDGE = 0.05  # of a door, from its handle [m]
 _TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
-_USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
-_STANDING = 0.012  # how far points of a handle are before its panel [m]
-_HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
+_MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
 _UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
 _MEET = 0.01  # handles nearer than this are one [m]
 _LOOKS = 500
-_TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 
 
 def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> FurnitureModel:
@@ -57,12 +51,15 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     normals = cloud.normals @ pose[:3, :3]
     shut = [_as_if_shut(part, pose) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
+    if any(part.opening == 0.0 for part in shut):
+        for part in shut:
+            part.meet_front(points, normals, float(bounds[1, 0]))
     parts = [
         _part(number, part, shut, points, normals, bounds, category)
         for number, part in enumerate(shut)
     ]
     parts = _distinct(parts)
-    return FurnitureModel(pose, _solid(points, parts, bounds), tuple(parts), category)
+    return FurnitureModel(pose, body_slices(points, bounds), tuple(parts), category)
 
 
 def _distinct(parts: list[PartModel]) -> list[PartModel]:
@@ -120,6 +117,18 @@ class _Shut:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
 
+    def meet_front(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float
+    ) -> None:
+        """Correct how far a drawer is open: shut, its panel is where those of others are, along X [m]."""
+        if self.kind != "slide" or self.opening == 0.0 or self.axis[0] < _SNAP:
+            return
+        own = _panel_place(transform(self.back, points), normals, self)
+        if own is not None and abs(own - front) < _MISTAKEN:
+            self.opening += own - front
+            self.back = compose(np.eye(3), -self.opening * self.axis)
+            self.handle[:3, 3] -= (own - front) * self.axis
+
 
 def _as_if_shut(part: SensedPart, pose: Float[np.ndarray, "4 4"]) -> _Shut:
     return _Shut(part, pose)
@@ -150,7 +159,7 @@ def _bounds(
     points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]
 ) -> Float[np.ndarray, "2 3"]:
     """Low and high corner of the body; its front is where the panels of shut parts are."""
-    low, high = _ends(points)
+    low, high = ends_of(points)
     fronts = [_panel_place(points, normals, part) for part in shut if part.opening == 0.0]
     fronts = [front for front in fronts if front is not None]
     opened = [part for part in shut if part.opening > 0.0]
@@ -161,19 +170,9 @@ def _bounds(
         high[0] = front
         body = points[points[:, 0] < front]
         if len(body) > 200:
-            low, ends = _ends(body)
+            low, ends = ends_of(body)
             high[1:] = ends[1:]
     return np.stack([low, high])
-
-
-def _ends(
-    points: Float[np.ndarray, "n 3"],
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Low and high corner of points, strays left out; what is far away counts as much as what is near [m]."""
-    cells, counts = np.unique(np.floor(points / _CELL).astype(int), axis=0, return_counts=True)
-    middles = (cells[counts >= _CELL_LEAST] + 0.5) * _CELL
-    low, high = np.percentile(middles, [0.4, 99.6], axis=0)
-    return low, high
 
 
 def _panel_place(
@@ -294,7 +293,7 @@ def _within_face(
     on &= ((points > panel[0] - 0.01) & (points < panel[1] + 0.01))[:, 1:].all(axis=1)
     if on.sum() < _FACE_LEAST:
         return panel
-    low, high = _ends(points[on])
+    low, high = ends_of(points[on])
     found = panel.copy()
     own, half = part.handle[:3, 3], _half_handle(part)
     for axis in (1, 2):
@@ -327,111 +326,3 @@ def _cavity(
     if (high - low < 0.04).any():
         return None
     return Cavity((low + high) / 2, high - low, moves_with_part=part.kind == "slide")
-
-
-def handle_label(
-    points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
-) -> tuple[PoseLabel, bool]:
-    """A handle with its lengths, as far as points show it, and whether they do.
-
-    Args:
-      points: Of the furniture, object frame, its part shut [m].
-      handle: `T_object_handle` as it was estimated.
-      front: Of the panel, along X [m].
-    """
-    if handle[0, 3] < front + _STANDING:
-        handle = handle.copy()
-        handle[0, 3] = front + _USUAL_HEIGHT
-    local = transform(invert(handle), points)
-    panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
-    standing = local[:, 1] > min(panel + _STANDING, -0.006)
-    on = standing & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH) & (local[:, 1] < 0.03)
-    on &= np.abs(local[:, 0]) < 0.35
-    if on.sum() < 12:
-        usual = np.array([0.10, 0.012, 0.012])
-        return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
-    along = _run(local[on, 0], 0.025)
-    on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
-    # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
-    across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
-    length = max(along[1] - along[0], 0.012)
-    # Of the bar, its front shows, and a side.
-    sides = np.percentile(local[on, 2], [8, 92])
-    front_side = float(np.percentile(local[on, 1], 85))
-    middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
-    middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
-    if length > 0.045:
-        middle = middle + handle[:3, 1] * (front_side - 0.005)
-    else:
-        middle = middle + handle[:3, 1] * (front_side + panel) / 2
-    depth = 0.012 if length > 0.045 else max(front_side - panel, 0.015)
-    extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
-    if length <= 0.045:
-        # A knob: as wide one way as the other, down to the panel.
-        side = float(np.clip(max(length, across), 0.014, 0.045))
-        extents = np.array([side, depth, side])
-    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS), True
-
-
-def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
-    """The run of values around 0 without a gap [m]."""
-    values = np.sort(along)
-    low = high = float(values[np.abs(values).argmin()])
-    for value in values[values > high]:
-        if value - high > gap:
-            break
-        high = float(value)
-    for value in values[values < low][::-1]:
-        if low - value > gap:
-            break
-        low = float(value)
-    return low, high
-
-
-def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
-    """The bar, and what carries it at both ends; a knob is one box. Object frame."""
-    # Handles are along an axis of the front, or nearly so: boxes around them.
-    turn = np.abs(handle.rotation)
-    half = turn @ handle.extents / 2
-    boxes = [np.stack([handle.origin - half, handle.origin + half])]
-    if handle.extents[0] > 0.045:
-        post = turn @ (np.array([0.012, 0.0, handle.extents[2]]) / 2)
-        for sign in (1.0, -1.0):
-            end = handle.origin + sign * handle.rotation[:, 0] * (handle.extents[0] / 2 - 0.006)
-            low, high = end - post, end + post
-            low[0], high[0] = front, handle.origin[0]
-            boxes.append(np.stack([low, high]))
-    else:
-        boxes[0][0, 0] = min(boxes[0][0, 0], front)
-    return np.stack(boxes)
-
-
-def _solid(
-    points: Float[np.ndarray, "n 3"], parts: Sequence[PartModel], bounds: Float[np.ndarray, "2 3"]
-) -> Boxes:
-    """The body in level slices, each from its front to the back: a plinth stays behind the front."""
-    body = (points[:, 0] < bounds[1, 0] + 0.004) & (points[:, 0] > bounds[0, 0] - 0.02)
-    points = points[body]
-    bottom, top = float(points[:, 2].min()), float(bounds[1, 2])
-    count = max(int(np.ceil((top - bottom) / _SLICE)), 1)
-    edges = np.linspace(bottom, top, count + 1)
-    slices: list[np.ndarray] = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
-        own = points[(points[:, 2] >= low) & (points[:, 2] < high)]
-        if len(own) < _SLICE_LEAST:
-            continue
-        sides = np.percentile(own, [1, 99], axis=0)
-        box = np.array([[bounds[0, 0], sides[0, 1], low], [sides[1, 0], sides[1, 1], high]])
-        # A side that no camera sees does not make a slice narrow.
-        box[0, 1], box[1, 1] = min(box[0, 1], bounds[0, 1]), max(box[1, 1], bounds[1, 1])
-        if bounds[1, 0] - box[1, 0] < 0.04:
-            box[1, 0] = bounds[1, 0]
-        before = slices[-1] if slices else None
-        if before is not None and (np.abs(before - box)[:, :2] < _ALIKE).all():
-            before[:, :2] = np.stack(
-                [np.minimum(before[0, :2], box[0, :2]), np.maximum(before[1, :2], box[1, :2])]
-            )
-            before[1, 2] = high
-        else:
-            slices.append(box)
-    return np.array(slices).reshape(-1, 2, 3)

@@ -130,9 +130,7 @@ def _across(axis: Float[np.ndarray, "3"]) -> tuple[np.ndarray, np.ndarray]:
     return first, np.cross(axis, first)
 
 
-def opening_of(
-    joint: Joint, start: Float[np.ndarray, "3"], now: Float[np.ndarray, "3"]
-) -> float:
+def opening_of(joint: Joint, start: Float[np.ndarray, "3"], now: Float[np.ndarray, "3"]) -> float:
     """By how much a joint has moved that took a point from `start` to `now` [m or rad], in its frame."""
     if joint.kind == "slide":
         return float((now - start) @ joint.axis)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -116,5 +115,3 @@ def _level(vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     if length < 0.1:
         raise InputError("the estimated front of the furniture faces up or down")
     return flat / length
-
-

@@ -13,7 +13,7 @@ from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
 
 _OTHER_KIND = 1.5  # what a wrong kind costs, in places
 _LOOKS = 1.0  # and a handle that is where the other kind has it
-_DOUBT = 1.0  # what no confidence costs, in places
+_UNSURE = 1.0  # what no confidence costs, in places
 _LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
 _FITS = 1.0  # places off, below which words fit
 _SHARE = 2.0  # how many places the whole height, or width, counts for
@@ -43,7 +43,7 @@ def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
         chosen = [i for i, candidate in enumerate(candidates) if candidate.confidence >= least]
         parts = [candidates[i].part for i in chosen]
         costs = [
-            _cost(words, parts, candidates[i]) + _DOUBT * (1 - candidates[i].confidence)
+            _cost(words, parts, candidates[i]) + _UNSURE * (1 - candidates[i].confidence)
             for i in chosen
         ]
         if costs and (min(costs) < _FITS or least == _LEAST[-1]):

@@ -136,7 +136,9 @@ def find_way(
         # It breaks after so many layers: look for another way through there.
         broken.add((way, chain[way], chain[way + 1]))
         kept = max(kept, chain[: way + 1], key=len)
-    way = _refined(planner, part, hold, layers, kept, openings, clearance) if len(kept) > 1 else None
+    way = (
+        _refined(planner, part, hold, layers, kept, openings, clearance) if len(kept) > 1 else None
+    )
     return way if isinstance(way, PartWay) else None
 
 

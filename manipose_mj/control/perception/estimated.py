@@ -40,11 +40,11 @@ from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfi
 CAMERAS = ("front", "left", "right")
 SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
 # Behind the robot and over its shoulders: they see the front of furniture. The first is the highest.
-_FACED = (0.72, 0.0, 0.15)
+_LOOKED_AT = (0.72, 0.0, 0.15)
 FRONT_VIEWS = (
-    CameraView("above", (-0.35, 0.0, 1.25), _FACED),
-    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _FACED),
-    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _FACED),
+    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
+    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT),
+    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
 )
 FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
 SENSORS = SensorConfig(

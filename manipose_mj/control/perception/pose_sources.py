@@ -11,7 +11,7 @@ from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.perception.sensed_world import SensedWorld
-from manipose_mj.control.perception.worlds import SimulatedWorld
+from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.observation import asset_mesh
@@ -54,9 +54,11 @@ def make_perception(
     check_pose_source(pose)
     if pose == "oracle":
         return OraclePerception(task, physics)
-    world = SimulatedWorld(task, physics)
+    world: World
     if pose == "estimated":
         world = SensedWorld(task, physics, SENSORS.camera_names, FRONT_CAMERAS)
+    else:
+        world = SimulatedWorld(task, physics)
     if estimator is None:
         return EstimatedPerception(task, physics, world)
     service = load_estimator(estimator)

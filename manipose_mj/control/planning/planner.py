@@ -82,7 +82,11 @@ def candidate_plans(
     if planner is not None and in_clutter(goals, estimate):
         yield from candidate_moves(goals, estimate, planner)
         return
-    unseen = [goal for goal in goals if isinstance(goal, TakenOutGoal) and goal.object not in estimate.objects]
+    unseen = [
+        goal
+        for goal in goals
+        if isinstance(goal, TakenOutGoal) and goal.object not in estimate.objects
+    ]
     if unseen:
         for plan in opening_plans(unseen[0].part, estimate):
             yield CandidatePlan(lambda plan=plan: plan)

@@ -95,7 +95,9 @@ class CollisionModel:
         self.robot = subtree_geoms(model, model.body(f"{robot}/").id)
         self.gripper = subtree_geoms(model, model.body(f"{robot}/hand").id)
         self._contype = model.geom_contype.copy()
-        self.arm_addresses = np.array([model.joint(f"{robot}/joint{i}").qposadr[0] for i in range(1, 8)])
+        self.arm_addresses = np.array(
+            [model.joint(f"{robot}/joint{i}").qposadr[0] for i in range(1, 8)]
+        )
         self.finger_addresses = np.array(
             [model.joint(f"{robot}/finger_joint{i}").qposadr[0] for i in (1, 2)]
         )

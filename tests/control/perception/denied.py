@@ -56,7 +56,7 @@ class DeniedTask(ManipulationTask):
         if name in ("goals", "furniture_masks", "control_timestep"):
             return getattr(task, name)
         if name == "robot":
-            return SimpleNamespace(configuration=lambda p: task.robot.configuration(p._real))
+            return _Robot(task.robot)
         if name == "objects":
             return {
                 each: SimpleNamespace(asset=SimpleNamespace(category=entity.asset.category))
@@ -65,6 +65,19 @@ class DeniedTask(ManipulationTask):
         if name == "task_observables":
             return _Sensors(task.task_observables)
         raise PrivilegedError(f"task.{name}")
+
+
+class _Robot:
+    """Its joints and its gripper's opening."""
+
+    def __init__(self, robot: Any) -> None:
+        self._robot = robot
+
+    def configuration(self, physics: Any) -> Any:
+        return self._robot.configuration(physics._real)
+
+    def __getattr__(self, name: str) -> Any:
+        raise PrivilegedError(f"robot.{name}")
 
 
 class _Sensors:

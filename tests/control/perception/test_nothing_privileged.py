@@ -62,7 +62,9 @@ def test_true_furniture_is_denied(pose, monkeypatch):
 
 def test_furniture_that_no_camera_sees_is_a_failure_of_perception(monkeypatch):
     environment = an_environment("articulated/store_chips_can_middle_drawer", "estimated")
-    monkeypatch.setattr(type(environment.task), "furniture_masks", property(lambda _: (("cabinet", 99),)))
+    monkeypatch.setattr(
+        type(environment.task), "furniture_masks", property(lambda _: (("cabinet", 99),))
+    )
     with pytest.raises(StageFailure, match="no camera sees enough of the cabinet") as failure:
         act(environment, "estimated", monkeypatch, 1)
     assert failure.value.stage == "perception"
