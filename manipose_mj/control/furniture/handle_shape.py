@@ -10,6 +10,8 @@ from manipose_mj.control.furniture.boxes import Boxes
 from manipose_mj.poses import SymmetryGroup, invert, transform
 
 _HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
+# Of a handle's lengths, to keep clear of: round ones fill no box, and fingers close on them.
+_SOLID = np.array([1.0, 0.8, 0.7])
 _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
@@ -25,6 +27,17 @@ def handle_label(
       handle: `T_object_handle` as it was estimated.
       front: Of the panel, along X [m].
     """
+    label, seen = _measured(points, handle, front)
+    if seen:
+        # A knob that was estimated beside itself shows in full from its own middle.
+        label, seen = _measured(points, label.pose, front)
+    return label, seen
+
+
+def _measured(
+    points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
+) -> tuple[PoseLabel, bool]:
+    """As `handle_label`, from points around where the handle was estimated."""
     if handle[0, 3] < front + _STANDING:
         handle = handle.copy()
         handle[0, 3] = front + _USUAL_HEIGHT
@@ -78,7 +91,7 @@ def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
     """The bar, and what carries it at both ends; a knob is one box. Object frame."""
     # Handles are along an axis of the front, or nearly so: boxes around them.
     turn = np.abs(handle.rotation)
-    half = turn @ handle.extents / 2
+    half = turn @ (handle.extents * _SOLID) / 2
     boxes = [np.stack([handle.origin - half, handle.origin + half])]
     if handle.extents[0] > 0.045:
         post = turn @ (np.array([0.012, 0.0, handle.extents[2]]) / 2)
@@ -88,5 +101,7 @@ def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
             low[0], high[0] = front, handle.origin[0]
             boxes.append(np.stack([low, high]))
     else:
+        across = np.abs(boxes[0][1, 1:] - boxes[0][0, 1:]).min() / 2
+        boxes[0][:, 1:] = handle.origin[1:] + np.array([[-across], [across]])
         boxes[0][0, 0] = min(boxes[0][0, 0], front)
     return np.stack(boxes)
