@@ -59,6 +59,10 @@ class Executor:
         """Tell the perception which way a part went, world frame [m], and whether it went no further."""
         self._perception.feel(name, path, stopped)
 
+    def pushed(self, name: str, opening: float) -> None:
+        """Tell the perception where a part was pushed to [m or rad]."""
+        self._perception.pushed(name, opening)
+
     def relax(self) -> Actions:
         """Have the arm stay where it is, whatever it was sent to."""
         self._joints = self.joints()

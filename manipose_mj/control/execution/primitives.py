@@ -212,6 +212,7 @@ class Primitives:
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
+        self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:

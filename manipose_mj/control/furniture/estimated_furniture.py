@@ -29,6 +29,7 @@ from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
 _SURE_PART = 0.15  # confidence of parts that nobody asked for
+_END = {"slide": 0.5, "hinge": 0.8}  # of the usual range, from which on a stop is its end
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 
@@ -194,12 +195,21 @@ class EstimatedFurniture:
         gone = opening_of(joint, own[0], own[-1])
         opening = started + gone
         low, high = joint.range
-        joint = replace(joint, range=(low, opening if stopped else max(high, opening)))
+        # A hand that slips off before is none that came to the end.
+        ends = stopped and opening > _END[joint.kind] * high
+        joint = replace(joint, range=(low, opening if ends else max(high, opening)))
         moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
         # Where the hand would be were the part shut, by the joint as it is known now.
         back = invert(moved.motion(opening))
         self._held = _Held(name, transform(back, own[-1][None])[0])
         self.model = model.with_part(moved)
+
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        part = self._part(name)
+        if part is not None and self.model is not None:
+            self.model = self.model.with_part(part.at(max(opening, 0.0)))
+            self._moved.add(name)
 
     def look_again(self) -> None:
         """Measure panels and cavities of what stands open."""

@@ -111,8 +111,12 @@ def _measured_panel(
         return panel
     seen = points[on]
     for axis in (1, 2):
-        ends = np.percentile(seen[:, axis], [0.7, 99.3])
-        panel[:, axis] = ends
+        panel[:, axis] = np.percentile(seen[:, axis], [0.7, 99.3])
+    # The hand may hide one end: a drawer's handle is in its middle.
+    assert part.part.handle is not None
+    middle = float(part.part.handle.origin[1])
+    half = float(np.abs(panel[:, 1] - middle).max())
+    panel[:, 1] = np.clip([middle - half, middle + half], low[1], high[1])
     panel[1, 0] = float(np.median(seen[:, 0]))
     return panel
 

@@ -12,6 +12,7 @@ from manipose_mj.poses import transform
 _FAR = 0.02  # a point further off counts as this far [m]
 _STEPS = {"slide": (0.01, 0.002), "hinge": (0.06, 0.01)}  # of the search, coarse and fine
 _BEYOND = {"slide": 0.04, "hinge": 0.25}  # openings beyond the usual that are looked at
+_WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESS = 0.018  # of a panel, whose other side may be all that shows [m]
@@ -20,7 +21,9 @@ _MOST = 300
 
 
 def found_opening(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float:
-    """The opening [m or rad] that fits best; the present one where none is clearly better.
+    """The opening [m or rad] near the present one that fits best; the present one where none is clearly better.
+
+    A door that stands wide open hardly shows; what it shut then looks much like it, shut.
 
     Args:
       part: With its looks.
@@ -43,8 +46,9 @@ def found_opening(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float:
         return float(nearest[: max(int(_SIDES * len(nearest)), 1)].mean())
 
     coarse, fine = _STEPS[kind]
-    most = part.part.joint.range[1] + _BEYOND[kind]
-    tried = [*np.arange(0.0, most, coarse).tolist(), part.opening]
+    least = max(part.opening - _WITHIN[kind], 0.0)
+    most = min(part.part.joint.range[1] + _BEYOND[kind], part.opening + _WITHIN[kind])
+    tried = [*np.arange(least, most, coarse).tolist(), part.opening]
     best = min(tried, key=misfit)
     near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()
     best = min([best, *near], key=misfit)

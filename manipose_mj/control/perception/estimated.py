@@ -210,6 +210,10 @@ class EstimatedPerception:
         """The hand led a part along this path, world frame [m]; `stopped`: it went no further."""
         self._world.feel(name, path, stopped)
 
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        self._world.pushed(name, opening)
+
     def _planning_scene(self) -> PlanningScene:
         """The scene as the latest estimates have it."""
         poses = {name: sensed.pose for name, sensed in self._known.items()}

@@ -61,6 +61,9 @@ class OraclePerception:
     def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
         """Nothing to learn."""
 
+    def pushed(self, name: str, opening: float) -> None:
+        """Nothing to learn."""
+
     def look_again(self) -> None:
         """Nothing is hidden."""
 

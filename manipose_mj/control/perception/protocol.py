@@ -58,6 +58,10 @@ class Perception(Protocol):
         """
         ...
 
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        ...
+
     def look_again(self) -> None:
         """Look at what was opened, and into it; plans made before no longer count."""
         ...

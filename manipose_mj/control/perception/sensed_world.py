@@ -148,6 +148,10 @@ class SensedWorld:
         """Correct a joint."""
         self._furniture.feel(name, path, stopped)
 
+    def pushed(self, name: str, opening: float) -> None:
+        """Look for a part about there."""
+        self._furniture.pushed(name, opening)
+
     def look_again(self, key: Any) -> None:
         """Measure what open parts show."""
         self._furniture.look_again()

@@ -74,6 +74,10 @@ class World(Protocol):
         """The hand led a part along a path, world frame [m]; `stopped`: it went no further."""
         ...
 
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        ...
+
     def look_again(self, key: Any) -> None:
         """Measure what open parts show; `build` comes next."""
         ...
@@ -132,6 +136,9 @@ class SimulatedWorld:
         """Nothing to remember."""
 
     def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """Nothing to learn."""
+
+    def pushed(self, name: str, opening: float) -> None:
         """Nothing to learn."""
 
     def look_again(self, key: Any) -> None:
