@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -105,7 +106,8 @@ class _Shut:
     """
 
     def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
-        self.sensed, self.kind = sensed, sensed.kind
+        self.sensed = sensed
+        self.kind: Literal["slide", "hinge"] = sensed.kind
         to_object = invert(pose)
         axis = to_object[:3, :3] @ sensed.axis
         self.axis = _snapped(axis / np.linalg.norm(axis))

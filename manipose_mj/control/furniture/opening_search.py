@@ -16,7 +16,7 @@ _WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESS = 0.018  # of a panel, whose other side may be all that shows [m]
-_SIDES = 0.75  # share of the points that has to be seen at best: some are hidden
+_SEEN = 0.75  # share of the points that has to be seen at best: some are hidden
 _MOST = 300
 
 
@@ -34,16 +34,17 @@ def found_opening(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float:
         return part.opening
     kind = part.part.joint.kind
     tree = cKDTree(points)
-    behind = looks - [_THICKNESS, 0.0, 0.0]
+    # A door that stands wide open turns its other side to the cameras; a drawer never does.
+    sides = [looks] if kind == "slide" else [looks, looks - [_THICKNESS, 0.0, 0.0]]
 
     def misfit(opening: float) -> float:
         motion = part.motion(opening)
         off = [
             np.minimum(tree.query(transform(motion, each), distance_upper_bound=_FAR)[0], _FAR)
-            for each in (looks, behind)
+            for each in sides
         ]
-        nearest = np.sort(np.minimum(*off))
-        return float(nearest[: max(int(_SIDES * len(nearest)), 1)].mean())
+        nearest = np.sort(np.min(off, axis=0))
+        return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
 
     coarse, fine = _STEPS[kind]
     least = max(part.opening - _WITHIN[kind], 0.0)
