@@ -37,7 +37,7 @@ def retreat(
     """
     clearance = replace(CONTACT, arm=0.0)
     if near is not None:
-        clearance = replace(clearance, target=near)
+        clearance = replace(clearance, target=near, arm=near / 2)
     query = CollisionQuery(clearance, target=released)
     back = (planner.backed_off(estimate.joints, distance) for distance in distances)
     up = (planner.raised(estimate.joints, distance) for distance in distances)
