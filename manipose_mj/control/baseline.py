@@ -20,6 +20,7 @@ from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
+from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
 from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
@@ -153,11 +154,12 @@ class Baseline:
             planner = planner.allowing(allowance)
             acted = False
             try:
-                steps = _until_a_look(plan) if looks else plan
+                steps = _until_a_look(plan) if looks > 0 else plan
                 for action in self._carry_out(steps, planner, primitives, progress):
                     acted = True
                     yield action
-                if len(steps) < len(plan) or scene.perception.unseen:
+                hidden = parts_to_look_behind(task.goals, estimate)
+                if len(steps) < len(plan) or (looks > 0 and hidden):
                     looks -= 1
                     scene.perception.look_again()
                     progress.made()

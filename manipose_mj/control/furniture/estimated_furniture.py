@@ -142,6 +142,7 @@ class EstimatedFurniture:
                 body=bodies[part.name],
                 geoms=geoms[part.name],
                 bodies_inside=_inside(model, part, objects),
+                cavity_seen=part.seen_inside,
             )
             for part in model.parts
         }
@@ -221,7 +222,8 @@ class EstimatedFurniture:
         for part in model.parts:
             if part.opening > 0.0:
                 found = part.at(found_opening(part, points))
-                model = model.with_part(seen_open(model, found, cloud))
+                # What does not show stays as it is usual: nobody need look again.
+                model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
         self.model = model
 
     def _part(self, name: str | None) -> PartModel | None:

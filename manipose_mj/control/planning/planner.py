@@ -12,6 +12,7 @@ from manipose_mj.control.planning.plan_articulated import (
     is_reached,
     opening_plans,
     part_goal_plans,
+    parts_to_look_behind,
 )
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
@@ -82,13 +83,8 @@ def candidate_plans(
     if planner is not None and in_clutter(goals, estimate):
         yield from candidate_moves(goals, estimate, planner)
         return
-    unseen = [
-        goal
-        for goal in goals
-        if isinstance(goal, TakenOutGoal) and goal.object not in estimate.objects
-    ]
-    if unseen:
-        for plan in opening_plans(unseen[0].part, estimate):
+    for part in parts_to_look_behind(goals, estimate):
+        for plan in opening_plans(part, estimate):
             yield CandidatePlan(lambda plan=plan: plan)
         return
     for plan in _joined(_plans_of_each(goals, estimate, planner)):

@@ -78,6 +78,7 @@ class PartEstimate:
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
       bodies_inside: Bodies of the objects in its cavity, which move with a drawer.
+      cavity_seen: Whether the cavity is known; else it is what is usual behind such a part.
     """
 
     name: str
@@ -90,6 +91,7 @@ class PartEstimate:
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     bodies_inside: tuple[int, ...] = ()
+    cavity_seen: bool = True
 
     @property
     def handle_pose(self) -> Float[np.ndarray, "4 4"]:
