@@ -21,7 +21,7 @@ def evaluate(
     *,
     episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
     seed: int = 0,
-    pose: Literal["oracle", "estimated"] = "oracle",
+    pose: Literal["oracle", "estimated", "estimated_objects"] = "oracle",
     jobs: int = CORES,
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
@@ -58,7 +58,8 @@ def evaluate(
       tasks: Tasks to run, as `manipose list` names them.
       episodes: Episodes per task; by default 50, or all 100 of a protocol.
       seed: Base seed; each episode derives its own from it.
-      pose: Where the baseline takes object poses from: the simulator, or clouds by the pose estimator.
+      pose: Where the baseline takes its knowledge from: the simulator, or clouds; or clouds of objects only,
+        furniture and surroundings from the simulator.
       jobs: Episodes at the same time, one core each; results do not depend on it.
       out: Folder for the results; by default a new one under manipose_results.
       resume: Go on with the results in --out after an interruption.

@@ -5,6 +5,7 @@
 | folder | holds |
 |---|---|
 | `perception/` | estimates of the scene, from the simulator or from cameras |
+| `furniture/` | furniture and surroundings, from clouds and from what the hand feels |
 | `scene/` | estimates and planning scenes, which never change; collision queries |
 | `grasping/` | choosing grasps of objects and handles; lifting, setting down, backing off |
 | `motion/` | inverse kinematics, free paths, straight lines, timing |
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from manipose_mj.control.conversion.convert import convert
     from manipose_mj.control.conversion.recording import Recording, record, replay
     from manipose_mj.control.perception.pose_sources import POSE_SOURCES
+    from manipose_mj.control.perception.protocol import Perception
     from manipose_mj.control.planning.plan import (
         Plan,
         Step,
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
     from manipose_mj.control.scene.scene_estimate import (
         ObjectEstimate,
         PartEstimate,
-        Perception,
         SceneEstimate,
     )
 

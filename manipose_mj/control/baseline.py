@@ -17,11 +17,13 @@ from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.pose_sources import make_perception
+from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
+from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
 from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
-from manipose_mj.control.scene.scene_estimate import PartEstimate, Perception, SceneEstimate
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
@@ -30,6 +32,7 @@ from manipose_mj.tasks.instructions.sentence import instruction
 
 # Plans an episode may try, and stages whose failure another plan may mend.
 MAX_PLANS = 5
+MAX_LOOKS = 6  # into what was opened, where furniture is estimated
 MAX_FAILED_MOVES = 30  # the same in clutter, where each move is a plan
 _WORTH_ANOTHER_PLAN = ("grasp", "plan", "motion")
 
@@ -59,7 +62,6 @@ class _Scene:
     """What the baseline compiles for one scene, whose model is `model`."""
 
     model: mujoco.MjModel
-    arm: ArmModel
     perception: Perception
 
 
@@ -96,8 +98,8 @@ class Baseline:
 
     @property
     def arm(self) -> ArmModel:
-        """The arm in the present scene."""
-        return self._scene().arm
+        """The arm in the present scene; of an estimated one, after an episode's reset."""
+        return self.perception.arm
 
     def _scene(self) -> _Scene:
         """What is compiled for the environment's present scene."""
@@ -108,9 +110,8 @@ class Baseline:
     def _compile(self) -> _Scene:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
-        arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
         perception = make_perception(self._pose, task, physics, self._estimator)
-        return _Scene(physics.model.ptr, arm, perception)
+        return _Scene(physics.model.ptr, perception)
 
     def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:
         """The actions of one episode, from the start state to the goal.
@@ -131,12 +132,14 @@ class Baseline:
         primitives = Primitives(executor)
         rng = np.random.default_rng(seed)
         progress, failures, allowance = _Progress(), 0, 0.0
+        looks = MAX_LOOKS if scene.perception.feels_joints or scene.perception.unseen else 0
         candidates: Iterator[CandidatePlan] | None = None
         while True:
             try:
                 if candidates is None:
                     estimate = executor.observe()
-                    planner = MotionPlanner(estimate.scene, scene.arm, timestep, rng, allowance)
+                    arm = scene.perception.arm
+                    planner = MotionPlanner(estimate.scene, arm, timestep, rng, allowance)
                     step_by_step = self._planner.step_by_step(task.goals, estimate)
                     candidates = self._planner.candidates(task.goals, estimate, planner)
                     candidate = _after(candidates, progress.failures_here)
@@ -151,10 +154,16 @@ class Baseline:
             planner = planner.allowing(allowance)
             acted = False
             try:
-                for action in self._carry_out(plan, planner, primitives, progress):
+                steps = _until_a_look(plan) if looks > 0 else plan
+                for action in self._carry_out(steps, planner, primitives, progress):
                     acted = True
                     yield action
-                if not (step_by_step and plan):
+                hidden = parts_to_look_behind(task.goals, estimate)
+                if len(steps) < len(plan) or (looks > 0 and hidden):
+                    looks -= 1
+                    scene.perception.look_again()
+                    progress.made()
+                elif not (step_by_step and plan):
                     break
                 candidates = None
             except StageFailure as failure:
@@ -210,6 +219,19 @@ class Baseline:
         except StageFailure:
             if not step_by_step or primitives.held is not None:
                 raise failure from None
+
+
+def _until_a_look(plan: Plan) -> Plan:
+    """The steps up to where another part or object than the first part opened comes next.
+
+    What a part opens shows more than was known when the plan was made.
+    """
+    first = plan[0].subject if plan and plan[0].primitive == "grasp_at" else None
+    led = [step for step in plan[:2] if step.subject == first and step.opening is not None]
+    if not led:
+        return plan
+    count = next((i for i, step in enumerate(plan) if step.subject != first), len(plan))
+    return plan[:count]
 
 
 def _share_open(part: PartEstimate) -> float:

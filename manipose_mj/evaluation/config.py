@@ -92,7 +92,7 @@ class EvaluationConfig:
             )
         if self.resample is not None and (self.protocol is None or self.resample < 0):
             raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
-        if self.estimator is not None and self.pose != "estimated":
+        if self.estimator is not None and self.pose == "oracle":
             raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         if self.batch is not None:
             if self.batch.worlds < 1:
@@ -116,10 +116,13 @@ class EvaluationConfig:
         if self.policy is not None:
             source = "true" if self.policy.sees_true_poses else "none"
             return {"objects": source, "furniture": source}
-        objects = "estimated" if self.pose == "estimated" else "true"
+        objects = "true" if self.pose == "oracle" else "estimated"
         if self.estimator is not None:
             objects = self.estimator.source
-        return {"objects": objects, "furniture": "true"}
+        return {
+            "objects": objects,
+            "furniture": "estimated" if self.pose == "estimated" else "true",
+        }
 
     @property
     def pose_source(self) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.scene.scene_estimate import Perception, SceneEstimate
+from manipose_mj.control.perception.protocol import Perception
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
 
 Action = Float[np.ndarray, "8"]
 Actions = Iterator[Action]
@@ -16,6 +17,7 @@ _CONVERGED = 0.0015  # of every joint to its target [rad]
 _MAX_SETTLE = 0.6  # [s]
 _STILL = 2e-4  # change of the opening in a control step that counts as none [m]
 _MAX_CLOSING = 1.6  # [s]; the fingers need 0.8 for their whole stroke
+_RELAXED = 0.06  # [s]
 _SQUEEZE = 0.15  # for the grip force to build up [s]
 
 
@@ -39,6 +41,37 @@ class Executor:
     def hold(self, name: str | None) -> None:
         """Tell the perception what the hand holds from now on; None: nothing."""
         self._perception.hold(name)
+
+    @property
+    def feels_joints(self) -> bool:
+        """Whether parts are led by what the hand feels."""
+        return self._perception.feels_joints
+
+    def joints(self) -> Float[np.ndarray, "7"]:
+        """Of the arm, as they are [rad]."""
+        return self._perception.robot()[0]
+
+    def opening(self) -> float:
+        """Of the gripper, as it is [m]."""
+        return self._perception.robot()[1]
+
+    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """Tell the perception which way a part went, world frame [m], and whether it went no further."""
+        self._perception.feel(name, path, stopped)
+
+    def pushed(self, name: str, opening: float) -> None:
+        """Tell the perception where a part was pushed to [m or rad]."""
+        self._perception.pushed(name, opening)
+
+    def relax(self) -> Actions:
+        """Have the arm stay where it is, whatever it was sent to."""
+        self._joints = self.joints()
+        yield from self.wait(_RELAXED)
+
+    def send(self, target: Float[np.ndarray, "7"]) -> Action:
+        """The action towards joint targets [rad]."""
+        self._joints = target
+        return self.command
 
     @property
     def command(self) -> Action:

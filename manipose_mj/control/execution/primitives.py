@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
+from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
@@ -45,6 +46,9 @@ _BIG_SLIP = (0.01, 0.08)
 _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
+# How far beyond the shut place a part is pushed whose place is estimated [m, rad].
+_BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
+_OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
@@ -136,7 +140,8 @@ class Primitives:
         yield from self._executor.wait(_SETTLE)
         self._executor.hold(None)
         estimate, planner = self._observe(planner)
-        yield from self._executor.follow(_retreat(planner, estimate, name))
+        near = _OWN_PART if self._executor.feels_joints and name in estimate.parts else None
+        yield from self._executor.follow(_retreat(planner, estimate, name, near))
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -169,10 +174,16 @@ class Primitives:
 
     def _move_part(self, planner: MotionPlanner, step: Step) -> Actions:
         """As far as the hand on the handle can lead it: a push may do the rest."""
-        assert step.opening is not None
+        assert step.opening is not None and self._held is not None
         estimate, planner = self._observe(planner)
         part = estimate.parts[step.subject]
         self._check_held(estimate, step.subject)
+        if self._executor.feels_joints:
+            yield from lead_part(self._executor, planner, step.subject, step.opening)
+            self._held = replace(
+                self._held, pose_tcp=_pose_in_hand(self._executor.observe(), step.subject)
+            )
+            return
         way = way_in_hand(planner, estimate, part, step.opening)
         way = None if way is None else ending_free(planner, part, way)
         if way is None or not leads_enough(way, part, step.opening):
@@ -194,10 +205,14 @@ class Primitives:
             return
         yield from self._executor.close()
         estimate, planner = self._observe(planner)
-        push = push_part(planner, estimate, estimate.parts[name], opening)
+        low = part.joint.range[0]
+        beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
+        aim = opening - beyond if opening <= low else opening
+        push = push_part(planner, estimate, estimate.parts[name], aim)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
+        self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:
@@ -272,9 +287,15 @@ def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> f
 
 
 def _retreat(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str
+    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
 ) -> Float[np.ndarray, "t 7"]:
     """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
+
+    Args:
+      planner: Plans in the scene of the estimate.
+      estimate: What is where.
+      name: Of what was let go.
+      near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
 
     Raises:
       StageFailure: There is no way.
@@ -284,7 +305,7 @@ def _retreat(
     touched = frozenset({planner.body_name(released.body)})
     for allowance in (planner.contact_allowance, *_GIVING_WAY):
         pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances)
+        line = retreat(pushing, estimate, released.geoms, touched, distances, near)
         if line is not None:
             return line
     raise StageFailure("release", f"no way to back off from {name}")

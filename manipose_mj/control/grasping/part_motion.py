@@ -19,7 +19,7 @@ from manipose_mj.control.motion.batch_ik import forward, seeds_for, solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.motion.trajectory import Timing, timed
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
-from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, Clearance, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate
 from manipose_mj.mjcf.panda.reachability import is_reachable
 from manipose_mj.tasks.articulated.hand_places import chained
@@ -102,6 +102,7 @@ def find_way(
     near: Float[np.ndarray, "7"],
     start: Float[np.ndarray, "7"] | None = None,
     start_tilt: float | None = None,
+    clearance: Clearance = CONTACT,
 ) -> PartWay | None:
     """The shortest way from the part's opening towards another, as far as the arm can.
 
@@ -113,13 +114,14 @@ def find_way(
       near: A configuration near which to start [rad].
       start: The configuration at the start, where the hand is there already [rad].
       start_tilt: And its tilt then [rad].
+      clearance: How near the hand may be to the part and to what is around it meanwhile.
 
     Returns:
       The way, which may end short of `opening`; None if there is none at all.
     """
     count = max(2, round(abs(opening - part.opening) / _LAYER[part.joint.kind]) + 1)
     openings = np.linspace(part.opening, opening, count)
-    layers = _layers(planner, part, hold, openings, near)
+    layers = _layers(planner, part, hold, openings, near, clearance)
     if start is not None and start_tilt is not None:
         layers[0] = _Layer(start[None], np.array([start_tilt]))
     broken: set[tuple[int, int, int]] = set()
@@ -128,13 +130,15 @@ def find_way(
         chain = _shortest(layers, near, broken)
         if len(chain) <= len(kept):
             break
-        way = _refined(planner, part, hold, layers, chain, openings)
+        way = _refined(planner, part, hold, layers, chain, openings, clearance)
         if isinstance(way, PartWay):
             return way
         # It breaks after so many layers: look for another way through there.
         broken.add((way, chain[way], chain[way + 1]))
         kept = max(kept, chain[: way + 1], key=len)
-    way = _refined(planner, part, hold, layers, kept, openings) if len(kept) > 1 else None
+    way = (
+        _refined(planner, part, hold, layers, kept, openings, clearance) if len(kept) > 1 else None
+    )
     return way if isinstance(way, PartWay) else None
 
 
@@ -154,6 +158,7 @@ def _layers(
     hold: Hold,
     openings: Float[np.ndarray, "k"],
     near: Float[np.ndarray, "7"],
+    clearance: Clearance,
 ) -> list[_Layer]:
     """Solutions free of collision, layer by layer."""
     tilts = hold.tilts
@@ -166,7 +171,7 @@ def _layers(
     least = np.linalg.eigvalsh(jacobian @ jacobian.transpose(0, 2, 1))[:, 0].reshape(solved.shape)
     solved &= least > MIN_DEXTERITY**2
     layers = []
-    touching = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
+    touching = CollisionQuery(clearance, opening=hold.opening, target=part.geoms)
     coming = CollisionQuery(APPROACH, opening=hold.opening_before, target=part.geoms)
     for k, q in enumerate(openings):
         own, angles = [], []
@@ -251,6 +256,7 @@ def _refined(
     layers: list[_Layer],
     chain: list[int],
     openings: Float[np.ndarray, "k"],
+    clearance: Clearance,
 ) -> PartWay | int:
     """The chain with poses in between; or after how many of its steps it breaks."""
     knots = np.arange(len(chain))
@@ -271,7 +277,7 @@ def _refined(
     jumps = np.append(False, np.abs(np.diff(joints, axis=0)).max(axis=1) > _JERK)
     bad = ~solved | jumps
     bad[0] = False  # the start is what it is
-    touching = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
+    touching = CollisionQuery(clearance, opening=hold.opening, target=part.geoms)
     for i in range(_CHECK_EVERY, len(fine), _CHECK_EVERY):
         if bad[: i + 1].any():
             break

@@ -20,7 +20,7 @@ from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
-from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, Clearance, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 
@@ -102,11 +102,16 @@ def grip_handle(
 
 
 def way_in_hand(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    opening: float,
+    clearance: Clearance = CONTACT,
 ) -> PartWay | None:
     """The way to lead a part towards another opening by its handle, as the hand holds that now.
 
-    It may end short of `opening` [m or rad]; None if there is none at all.
+    It may end short of `opening` [m or rad]; None if there is none at all. `clearance` is how near the hand
+    may be to the part and to what is around it.
     """
     hold, tilt = grip_now(part, planner.tcp_pose(estimate.joints), estimate.opening)
     return find_way(
@@ -117,6 +122,7 @@ def way_in_hand(
         near=estimate.joints,
         start=estimate.joints,
         start_tilt=tilt,
+        clearance=clearance,
     )
 
 

@@ -23,6 +23,7 @@ def retreat(
     released: Bool[np.ndarray, "ngeom"],
     touched: frozenset[str],
     distances: Sequence[float] = RETREATS,
+    near: float | None = None,
 ) -> Float[np.ndarray, "t 7"] | None:
     """Joint targets straight back, or else up, to where the next motion has room if there is such a place.
 
@@ -32,8 +33,12 @@ def retreat(
       released: Mask of the geoms that the gripper may touch on the way.
       touched: Names of bodies that it touches.
       distances: To try, the best first [m].
+      near: How near the hand may be to what was released, negative for touching [m]; None: as is usual.
     """
-    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released)
+    clearance = replace(CONTACT, arm=0.0)
+    if near is not None:
+        clearance = replace(clearance, target=near, arm=near / 2)
+    query = CollisionQuery(clearance, target=released)
     back = (planner.backed_off(estimate.joints, distance) for distance in distances)
     up = (planner.raised(estimate.joints, distance) for distance in distances)
     for ways in (back, up):

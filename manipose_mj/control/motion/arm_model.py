@@ -26,7 +26,18 @@ class ArmModel:
 
     def __init__(self, root: mjcf.RootElement, prefix: str = "panda") -> None:
         """Compiles the scene of `root` without its other joints."""
-        spec = mujoco.MjSpec.from_string(root.to_xml_string(), assets=root.get_assets())
+        self._compile(
+            mujoco.MjSpec.from_string(root.to_xml_string(), assets=root.get_assets()), prefix
+        )
+
+    @classmethod
+    def of_spec(cls, spec: mujoco.MjSpec, prefix: str = "panda") -> ArmModel:
+        """The same of a scene that was put together otherwise; `spec` is used up."""
+        arm = cls.__new__(cls)
+        arm._compile(spec, prefix)
+        return arm
+
+    def _compile(self, spec: mujoco.MjSpec, prefix: str) -> None:
         arm = {f"{prefix}/{name}" for name in _ARM_JOINTS}
         for collection in (spec.actuators, spec.tendons, spec.equalities, spec.sensors):
             for element in list(collection):

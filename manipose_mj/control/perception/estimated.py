@@ -2,7 +2,7 @@
 
 Of objects perception reads the task's observations of depth and segmentation, and each one's category,
 as an instance detector would give them. They never read an object's pose, model, label or name.
-Furniture is estimated elsewhere: `FurniturePerception`.
+Furniture and surroundings are a `World`'s.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
-from manipose_mj.control.perception.estimated_scene import EstimatedScene, EstimatedScenes
-from manipose_mj.control.perception.furniture_perception import FurniturePerception, TrueFurniture
+from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.known_shapes import KnownShape, known_shapes
 from manipose_mj.control.perception.object_views import ObjectView, ObjectViews
 from manipose_mj.control.perception.pose_sensing import (
@@ -27,19 +26,29 @@ from manipose_mj.control.perception.pose_sensing import (
     seen_points,
     sense_pose,
 )
+from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
-from manipose_mj.tasks.observations.sensor_config import SensorConfig
+from manipose_mj.tasks.goals import TakenOutGoal
+from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
 
 # What an estimating agent looks through: a depth camera's noise, at a third of its usual pixels.
 CAMERAS = ("front", "left", "right")
 SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
+# Behind the robot and over its shoulders: they see the front of furniture. The first is the highest.
+_LOOKED_AT = (0.72, 0.0, 0.15)
+FRONT_VIEWS = (
+    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
+    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT),
+    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
+)
+FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
 SENSORS = SensorConfig(
-    cameras=(*CAMERAS, *SPARE_CAMERAS),
+    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS),
     height=240,
     width=320,
     depth_model="structured_light",
@@ -71,28 +80,27 @@ class EstimatedPerception:
         self,
         task: ManipulationTask,
         physics: mjcf.Physics,
+        world: World | None = None,
         *,
         estimators: Callable[[str], Estimator] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
-        furniture: FurniturePerception | None = None,
     ) -> None:
         """Compiles nothing yet.
 
         Args:
           task: Of an environment whose sensors are `SENSORS`, or others with the same cameras.
           physics: The environment's.
+          world: Furniture and surroundings; those of the simulator by default.
           estimators: The estimator of a category; `PoseEstimator.load` by default.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
-          furniture: Where drawers and doors are; the simulator by default.
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
         self._meshes = meshes
-        self._furniture = furniture or TrueFurniture(task, physics)
+        self._world = world or SimulatedWorld(task, physics)
+        self.feels_joints = self._world.feels_joints
         self._views = ObjectViews(task.task_observables, CAMERAS)
         self._more_views = ObjectViews(task.task_observables, (*CAMERAS, *SPARE_CAMERAS))
-        self._scenes = EstimatedScenes(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        self._scene: EstimatedScene | None = None
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
@@ -100,7 +108,7 @@ class EstimatedPerception:
         self._keys = _keys(0)
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
-            "furniture": self._furniture.source,
+            "furniture": self._world.source,
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
 
@@ -112,23 +120,58 @@ class EstimatedPerception:
           InputError: There are no weights for a category.
         """
         self._keys = _keys(seed)
-        self._held, self._known = None, {}
-        needed = {getattr(goal, "object", None) for goal in self._task.goals}
-        categories = self._categories()
-        for category in categories.values():
+        self._held, self._known, self._grasps = None, {}, {}
+        for category in self._categories().values():
             self._load(category)  # what has no weights is told before anything is built
-        for name, category in categories.items():
+        self._world.reset(self._keys())
+        self._find_objects()
+        hidden = {goal.object for goal in self._task.goals if isinstance(goal, TakenOutGoal)}
+        for name in self._needed - self._known.keys() - hidden:
+            raise StageFailure("perception", f"no camera sees enough of {name}")
+        self._time = float(self._physics.data.time)
+        self._build()
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm among what is known."""
+        return self._world.arm
+
+    @property
+    def unseen(self) -> frozenset[str]:
+        """Objects of goals that no camera has seen yet."""
+        return frozenset(self._needed - self._known.keys())
+
+    def look_again(self) -> None:
+        """After something was opened: measure it, and look for what it hid.
+
+        Raises:
+          StageFailure: What has to be taken out of it is not seen still.
+        """
+        self.observe()  # where parts and objects are by now
+        self._world.look_again(self._keys())
+        self._find_objects()
+        for name in self.unseen:
+            raise StageFailure("perception", f"no camera sees enough of {name}, opened or not")
+        self._build()
+
+    @property
+    def _needed(self) -> set[str]:
+        names = (getattr(goal, "object", None) for goal in self._task.goals)
+        return {name for name in names if name is not None}
+
+    def _find_objects(self) -> None:
+        """Estimate what is seen for the first time."""
+        for name, category in self._categories().items():
+            if name in self._known:
+                continue
             shapes = known_shapes(category)
             sensed = self._sensed(name, self._views.of(self._physics, name), shapes)
             if sensed is not None:
                 self._known[name] = sensed
-            elif name in needed:
-                raise StageFailure("perception", f"no camera sees enough of {name}")
-        self._time = float(self._physics.data.time)
-        self._grasps = {name: sensed.shape.sampled_grasps() for name, sensed in self._known.items()}
-        self._scene = self._scenes.build(
-            {name: sensed.shape.hulls for name, sensed in self._known.items()}
-        )
+                self._grasps[name] = sensed.shape.sampled_grasps()
+
+    def _build(self) -> None:
+        self._world.build({name: sensed.shape.hulls for name, sensed in self._known.items()})
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
         """Joint angles [rad] and opening [m]."""
@@ -140,6 +183,7 @@ class EstimatedPerception:
         time = float(self._physics.data.time)
         if time != self._time:
             tcp = self._planning_scene().tcp_pose(joints)
+            self._world.follow(tcp)
             for name in self._known:
                 self._known[name] = self._updated(name, tcp)
             self._time = time
@@ -147,7 +191,7 @@ class EstimatedPerception:
         objects = {
             name: self._estimate(name, sensed, scene) for name, sensed in self._known.items()
         }
-        parts = self._furniture.parts(scene, objects)
+        parts = self._world.parts(scene, objects)
         self.last_estimates = tuple(
             EstimatedPose(name, sensed.pose, sensed.confidence, sensed.camera)
             for name, sensed in self._known.items()
@@ -157,16 +201,23 @@ class EstimatedPerception:
     def hold(self, name: str | None) -> None:
         """From now on the hand holds this, as it was seen last; None: it holds nothing."""
         self._held = None
+        tcp = self._planning_scene().tcp_pose(self.robot()[0])
+        self._world.hold(name, tcp)
         if name in self._known:
-            tcp = self._planning_scene().tcp_pose(self.robot()[0])
             self._held = (name, invert(tcp) @ self._known[name].pose)
 
+    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """The hand led a part along this path, world frame [m]; `stopped`: it went no further."""
+        self._world.feel(name, path, stopped)
+
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        self._world.pushed(name, opening)
+
     def _planning_scene(self) -> PlanningScene:
-        """The scene as the simulator and the latest estimates have it."""
-        assert self._scene is not None  # reset comes first
+        """The scene as the latest estimates have it."""
         poses = {name: sensed.pose for name, sensed in self._known.items()}
-        physics = self._physics
-        return self._scene.observed(physics.model.ptr, physics.data.qpos, poses)
+        return self._world.observed(*self.robot(), poses)
 
     def _categories(self) -> Mapping[str, str]:
         """Of each object's category: all that is told about it."""
@@ -211,8 +262,7 @@ class EstimatedPerception:
         return tuple(replace(view, mesh=mesh) for view in views)
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
-        assert self._scene is not None
-        body = self._scene.body(name)
+        body = self._world.body(name)
         return ObjectEstimate(
             name=name,
             pose=sensed.pose,

@@ -29,15 +29,10 @@ class EstimatedScenes:
           robot: The robot's name in it.
         """
         spec = mujoco.MjSpec.from_string(root.to_xml_string(), assets=root.get_assets())
-        for collection in (spec.actuators, spec.tendons, spec.equalities, spec.sensors):
-            for element in list(collection):
-                spec.delete(element)
+        without_looks(spec)
         for body in list(spec.bodies):
             if any(joint.type == _FREE for joint in body.joints):
                 spec.delete(body)
-        for geom in list(spec.geoms):
-            if not geom.contype and not geom.conaffinity:
-                spec.delete(geom)
         self._spec = spec
         self._robot = robot
 
@@ -49,17 +44,7 @@ class EstimatedScenes:
         """
         spec = self._spec.copy()
         for number, (name, hulls) in enumerate(shapes.items()):
-            body = spec.worldbody.add_body(name=PREFIX + name, pos=[number, 0.0, _HIGH])
-            body.add_freejoint()
-            body.mass, body.inertia, body.explicitinertial = 1.0, [1e-3] * 3, True
-            for part, hull in enumerate(hulls):
-                mesh = f"{PREFIX}{name}/{part}"
-                spec.add_mesh(
-                    name=mesh,
-                    uservert=np.asarray(hull, float).ravel().tolist(),
-                    inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
-                )
-                body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh)
+            add_object(spec, number, name, hulls)
         return EstimatedScene(CollisionModel(spec.compile(), self._robot))
 
 
@@ -109,3 +94,30 @@ class EstimatedScene:
             address = self._collision_model.joint_address(self.body(name))
             own_qpos[address : address + 7] = pose_to_vector(pose)
         return PlanningScene(self._collision_model, ScenePositions(own_qpos, body_pos, body_quat))
+
+
+def without_looks(spec: mujoco.MjSpec) -> None:
+    """Delete from a scene what neither collides nor turns: servos, sensors, visual geoms."""
+    for collection in (spec.actuators, spec.tendons, spec.equalities, spec.sensors):
+        for element in list(collection):
+            spec.delete(element)
+    for geom in list(spec.geoms):
+        if not geom.contype and not geom.conaffinity:
+            spec.delete(geom)
+
+
+def add_object(
+    spec: mujoco.MjSpec, number: int, name: str, hulls: Sequence[Float[np.ndarray, "_ 3"]]
+) -> None:
+    """Add a free body, `estimated/NAME`, with these convex parts, apart from those of other numbers."""
+    body = spec.worldbody.add_body(name=PREFIX + name, pos=[number, 0.0, _HIGH])
+    body.add_freejoint()
+    body.mass, body.inertia, body.explicitinertial = 1.0, [1e-3] * 3, True
+    for part, hull in enumerate(hulls):
+        mesh = f"{PREFIX}{name}/{part}"
+        spec.add_mesh(
+            name=mesh,
+            uservert=np.asarray(hull, float).ravel().tolist(),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+        )
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh)

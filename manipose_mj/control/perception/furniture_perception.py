@@ -1,9 +1,8 @@
-"""Estimates of drawers and doors, wherever they come from."""
+"""Drawers and doors as the simulator has them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 from dm_control import mjcf
@@ -15,27 +14,6 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimat
 from manipose_mj.mjcf.objects import ArticulatedObject
 from manipose_mj.poses import invert
 from manipose_mj.tasks.core.task import ManipulationTask
-
-
-class FurniturePerception(Protocol):
-    """Where the knowledge of furniture comes from.
-
-    Attributes:
-      source: `"true"` or `"estimated"`, for reports.
-    """
-
-    source: str
-
-    def parts(
-        self, scene: PlanningScene, objects: Mapping[str, ObjectEstimate]
-    ) -> dict[str, PartEstimate]:
-        """The parts with a handle, by name, in a planning scene that is up to date.
-
-        Args:
-          scene: Whose bodies and geoms the estimates name.
-          objects: Estimates of the objects; some may lie in a drawer.
-        """
-        ...
 
 
 class TrueFurniture:

@@ -9,6 +9,7 @@ from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import GraspSet
+from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.furniture_perception import TrueFurniture
 from manipose_mj.control.scene.collision_model import CollisionModel, subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
@@ -26,7 +27,16 @@ class OraclePerception:
         self._physics = physics
         self._model = CollisionModel(physics.model.ptr, task.robot.mjcf_model.model)
         self._furniture = TrueFurniture(task, physics)
+        self._arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
         self.sources: Mapping[str, str] = {"objects": "true", "furniture": self._furniture.source}
+
+    feels_joints = False
+    unseen: frozenset[str] = frozenset()
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm in the simulator's scene."""
+        return self._arm
 
     def reset(self, seed: int) -> None:
         """Nothing to prepare: nothing is remembered, nothing is random."""
@@ -47,6 +57,15 @@ class OraclePerception:
 
     def hold(self, name: str | None) -> None:
         """Nothing to remember: what is held is seen."""
+
+    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """Nothing to learn."""
+
+    def pushed(self, name: str, opening: float) -> None:
+        """Nothing to learn."""
+
+    def look_again(self) -> None:
+        """Nothing is hidden."""
 
     def _object(self, name: str, entity: RigidObject) -> ObjectEstimate:
         frame = mjcf.get_attachment_frame(entity.mjcf_model)

@@ -6,10 +6,12 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset
-from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerception
+from manipose_mj.control.perception.estimated import FRONT_CAMERAS, SENSORS, EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
-from manipose_mj.control.scene.scene_estimate import Perception
+from manipose_mj.control.perception.protocol import Perception
+from manipose_mj.control.perception.sensed_world import SensedWorld
+from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.observation import asset_mesh
@@ -17,7 +19,8 @@ from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
 
-POSE_SOURCES = ("oracle", "estimated")
+# Everything true; everything estimated; objects estimated and all else true.
+POSE_SOURCES = ("oracle", "estimated", "estimated_objects")
 
 
 def check_pose_source(pose: str) -> None:
@@ -28,7 +31,7 @@ def check_pose_source(pose: str) -> None:
 
 def sensors_for(pose: str) -> SensorConfig:
     """What the environment of such a baseline has to measure."""
-    return SENSORS if pose == "estimated" else SensorConfig()
+    return SensorConfig() if pose == "oracle" else SENSORS
 
 
 def make_perception(
@@ -49,15 +52,21 @@ def make_perception(
       InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
-    if pose != "estimated":
+    if pose == "oracle":
         return OraclePerception(task, physics)
+    world: World
+    if pose == "estimated":
+        world = SensedWorld(task, physics, SENSORS.camera_names, FRONT_CAMERAS)
+    else:
+        world = SimulatedWorld(task, physics)
     if estimator is None:
-        return EstimatedPerception(task, physics)
+        return EstimatedPerception(task, physics, world)
     service = load_estimator(estimator)
 
     return EstimatedPerception(
         task,
         physics,
+        world,
         estimators=lambda category: ForeignEstimator(service, category),
         meshes=_mesh_of if estimator.give_cad else None,
     )

@@ -24,7 +24,7 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimat
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.tasks.articulated.hand_room import Placement, count_clear, hands_around
-from manipose_mj.tasks.goals import InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
+from manipose_mj.tasks.goals import Goal, InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
 
 PartGoal = InsideGoal | TakenOutGoal | OpenGoal | ShutGoal
 
@@ -88,6 +88,34 @@ def part_goal_plans(
         yield ()
     else:
         yield from _plans_through(goal, estimate, planner, part)
+
+
+def parts_to_look_behind(goals: tuple[Goal, ...], estimate: SceneEstimate) -> tuple[str, ...]:
+    """Parts that have to be opened before anybody can plan: what is behind them is not known.
+
+    Args:
+      goals: All of them.
+      estimate: What is where.
+    """
+    return tuple(
+        goal.part
+        for goal in goals
+        if isinstance(goal, InsideGoal | TakenOutGoal)
+        and (goal.object not in estimate.objects or not estimate.parts[goal.part].cavity_seen)
+    )
+
+
+def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:
+    """Plans that open a part, to see what is behind it; no steps where it is open."""
+    part = estimate.parts[name]
+    low, high = part.joint.range
+    if part.opening >= low + OPEN_ENOUGH * (high - low):
+        yield ()
+        return
+    wide_open = low + OPEN_SHARE * (high - low)
+    yield _open(part, wide_open)
+    if part.joint.kind == "hinge" and part.opening > low + AJAR:
+        yield (Step("move_to", name, opening=wide_open),)
 
 
 def is_reached(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:

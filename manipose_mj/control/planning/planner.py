@@ -7,7 +7,13 @@ from typing import Protocol
 
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Plan
-from manipose_mj.control.planning.plan_articulated import PartGoal, is_reached, part_goal_plans
+from manipose_mj.control.planning.plan_articulated import (
+    PartGoal,
+    is_reached,
+    opening_plans,
+    part_goal_plans,
+    parts_to_look_behind,
+)
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
@@ -76,6 +82,10 @@ def candidate_plans(
     """
     if planner is not None and in_clutter(goals, estimate):
         yield from candidate_moves(goals, estimate, planner)
+        return
+    for part in parts_to_look_behind(goals, estimate):
+        for plan in opening_plans(part, estimate):
+            yield CandidatePlan(lambda plan=plan: plan)
         return
     for plan in _joined(_plans_of_each(goals, estimate, planner)):
         yield CandidatePlan(lambda plan=plan: plan)

@@ -23,7 +23,10 @@ def with_part_at(scene: PlanningScene, part: PartEstimate, opening: float) -> Pl
     """The scene with the part, and the objects in it, at another opening [m or rad]."""
     moved = joint_motion(part, opening) @ invert(joint_motion(part, part.opening))
     motion = part.base_pose @ moved @ invert(part.base_pose)
-    opened = scene.with_joint_at(part.body, opening)
+    if scene.is_free(part.body):
+        opened = scene.with_body_at(part.body, part.base_pose @ joint_motion(part, opening))
+    else:
+        opened = scene.with_joint_at(part.body, opening)
     for body in part.bodies_inside:
         opened = opened.with_body_at(body, motion @ scene.body_pose(body))
     return opened

@@ -7,6 +7,7 @@ Nothing here steps time.
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -68,11 +69,19 @@ class CollisionModel:
       model: The copy, with margins that detect contacts early.
       robot: Mask of the robot's geoms, `(ngeom,)`.
       gripper: Mask of the hand's, which may touch what it grasps.
-      loose: Mask of the geoms of bodies on free joints.
+      loose: Mask of the geoms of bodies on free joints, but for parts of furniture.
+      arm_addresses: Where in `qpos` the arm's joints are, `(7,)`.
+      finger_addresses: Where the fingers' are, `(2,)`.
     """
 
-    def __init__(self, model: mujoco.MjModel, robot: str) -> None:
-        """Copies the model of a scene whose robot has this name."""
+    def __init__(self, model: mujoco.MjModel, robot: str, parts: Sequence[str] = ()) -> None:
+        """Copies the model of a scene.
+
+        Args:
+          model: Of the scene.
+          robot: The robot's name in it.
+          parts: Names of bodies on free joints that are parts of furniture: they do not give way.
+        """
         self.model = copy.copy(model)
         self.model.geom_margin[:] = DETECTION_DISTANCE
         # The broad phase drops pairs of bodies by margins of its own.
@@ -81,11 +90,15 @@ class CollisionModel:
         roots = model.body_rootid[model.geom_bodyid]
         jointed = model.body_jntnum[roots] == 1
         self.loose = jointed & (model.jnt_type[model.body_jntadr[roots]] == _FREE)
+        for part in parts:
+            self.loose &= ~subtree_geoms(model, model.body(part).id)
         self.robot = subtree_geoms(model, model.body(f"{robot}/").id)
         self.gripper = subtree_geoms(model, model.body(f"{robot}/hand").id)
         self._contype = model.geom_contype.copy()
-        self._arm = np.array([model.joint(f"{robot}/joint{i}").qposadr[0] for i in range(1, 8)])
-        self._fingers = np.array(
+        self.arm_addresses = np.array(
+            [model.joint(f"{robot}/joint{i}").qposadr[0] for i in range(1, 8)]
+        )
+        self.finger_addresses = np.array(
             [model.joint(f"{robot}/finger_joint{i}").qposadr[0] for i in (1, 2)]
         )
         self._tcp = model.site(f"{robot}/tcp").id
@@ -119,9 +132,9 @@ class CollisionModel:
             self.model.body_quat[:] = positions.body_quat
         data.qpos[:] = positions.qpos
         if opening is not None:
-            data.qpos[self._fingers] = opening / 2
+            data.qpos[self.finger_addresses] = opening / 2
         if joints is not None:
-            data.qpos[self._arm] = joints
+            data.qpos[self.arm_addresses] = joints
         mujoco.mj_kinematics(self.model, data)
         return data
 

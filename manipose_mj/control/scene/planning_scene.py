@@ -40,6 +40,11 @@ class PlanningScene:
         address = self.collision_model.joint_address(body)
         return vector_to_pose(self.positions.qpos[address : address + 7])
 
+    def is_free(self, body: int) -> bool:
+        """Whether a body is put where an estimate has it: it has no joint of its own in the scene."""
+        joint = int(self.model.body_jntadr[body])
+        return joint >= 0 and int(self.model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_FREE)
+
     def with_joint_at(self, body: int, position: float) -> PlanningScene:
         """The scene with a body's hinge or slide at another position [rad or m]."""
         return self._with_qpos(self.collision_model.joint_address(body), np.array([position]))

@@ -6,9 +6,7 @@ knows the difference.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -80,6 +78,7 @@ class PartEstimate:
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
       bodies_inside: Bodies of the objects in its cavity, which move with a drawer.
+      cavity_seen: Whether the cavity is known; else it is what is usual behind such a part.
     """
 
     name: str
@@ -92,6 +91,7 @@ class PartEstimate:
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     bodies_inside: tuple[int, ...] = ()
+    cavity_seen: bool = True
 
     @property
     def handle_pose(self) -> Float[np.ndarray, "4 4"]:
@@ -125,29 +125,3 @@ class SceneEstimate:
     def in_hand(self, name: str) -> AttachedObject:
         """An object as the hand holds it now."""
         return self.objects[name].attached_to(self.tcp_pose)
-
-
-class Perception(Protocol):
-    """Where a policy's knowledge comes from.
-
-    Attributes:
-      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
-    """
-
-    sources: Mapping[str, str]
-
-    def reset(self, seed: int) -> None:
-        """Start an episode; `seed` is that of everything random."""
-        ...
-
-    def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
-        """Joint angles [rad] and opening [m], cheap enough for every control step."""
-        ...
-
-    def observe(self) -> SceneEstimate:
-        """An estimate of the whole scene as it is now."""
-        ...
-
-    def hold(self, name: str | None) -> None:
-        """The hand holds this from now on; None: it has let go."""
-        ...

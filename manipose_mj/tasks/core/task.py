@@ -146,6 +146,12 @@ class ManipulationTask(composer.Task):
         return tuple(self.scene.articulated_objects[p.index] for p in self.start.furniture)
 
     @property
+    def furniture_masks(self) -> tuple[tuple[str, int], ...]:
+        """Category of each piece of furniture in play, and its id in segmentations."""
+        numbers = {entity: n for n, entity in enumerate(self.scene.instances.values(), start=1)}
+        return tuple((piece.asset.category, numbers[piece]) for piece in self.articulated_objects)
+
+    @property
     def object_name(self) -> str:
         """The asset that this episode is about."""
         return next(e.asset.name for e in (*self.objects.values(), *self.articulated_objects))

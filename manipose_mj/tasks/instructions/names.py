@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.part_choice import kind_of, rows_of
 
-_ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 _UPRIGHT = 0.9  # cosine to the vertical, from which on an axis points up
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -25,8 +27,13 @@ def part_words(asset: Asset, part: MovingPart) -> str:
       asset: That the part is of.
       part: With a handle.
     """
+    return part_words_among(asset.parts, part)
+
+
+def part_words_among(parts: Sequence[MovingPart], part: MovingPart) -> str:
+    """The same among any parts, wherever they are known from."""
     kind = kind_of(part)
-    alike = [p for p in asset.parts if p.handle is not None and kind_of(p) == kind]
+    alike = [p for p in parts if p.handle is not None and kind_of(p) == kind]
     rows = rows_of(alike)
     row = next(i for i, parts in enumerate(rows) if any(p.name == part.name for p in parts))
     beside = sorted(rows[row], key=_from_left)
@@ -45,7 +52,7 @@ def _among(index: int, count: int, names: tuple[str, str, str]) -> tuple[str, st
         return names[0] if index == 0 else names[2], ""
     if 2 * index == count - 1:
         return names[1], ""
-    return _ORDINALS[index], f"from the {names[0]}"
+    return ORDINALS[index], f"from the {names[0]}"
 
 
 def _from_left(part: MovingPart) -> float:

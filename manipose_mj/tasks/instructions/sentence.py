@@ -48,6 +48,19 @@ def instruction(task: ManipulationTask) -> str:
     return f"{text[:1].upper()}{text[1:]}."
 
 
+def asked_parts(task: ManipulationTask) -> dict[str, str]:
+    """What an instruction calls the drawers and doors that goals are about, by the goals' names for them.
+
+    Args:
+      task: In an episode.
+    """
+    names = [part for goal in task.goals if (part := getattr(goal, "part", None)) is not None]
+    return {
+        name: part_words(asset := _owner(task, name), asset.part(name))
+        for name in dict.fromkeys(names)
+    }
+
+
 def _phrase(task: ManipulationTask, goal: Goal) -> str | None:
     """The words of one goal; None where it has none."""
     match goal:

@@ -1,0 +1,52 @@
+"""The body of a piece of furniture: its ends, and level slices of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.furniture.boxes import Boxes
+
+_SLICE = 0.05  # height of what the body is cut into [m]
+_ALIKE = 0.02  # slices whose sides differ by less are one [m]
+_SLICE_LEAST = 25  # points
+_CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
+
+
+def ends_of(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Low and high corner of points, strays left out; what is far away counts as much as what is near [m]."""
+    cells, counts = np.unique(np.floor(points / _CELL).astype(int), axis=0, return_counts=True)
+    middles = (cells[counts >= _CELL_LEAST] + 0.5) * _CELL
+    low, high = np.percentile(middles, [0.4, 99.6], axis=0)
+    return low, high
+
+
+def body_slices(points: Float[np.ndarray, "n 3"], bounds: Float[np.ndarray, "2 3"]) -> Boxes:
+    """The body in level slices, each from its front to the back: a plinth stays behind the front."""
+    body = (points[:, 0] < bounds[1, 0] + 0.004) & (points[:, 0] > bounds[0, 0] - 0.02)
+    points = points[body]
+    bottom, top = float(points[:, 2].min()), float(bounds[1, 2])
+    count = max(int(np.ceil((top - bottom) / _SLICE)), 1)
+    edges = np.linspace(bottom, top, count + 1)
+    slices: list[np.ndarray] = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        own = points[(points[:, 2] >= low) & (points[:, 2] < high)]
+        if len(own) < _SLICE_LEAST:
+            continue
+        sides = np.percentile(own, [1, 99], axis=0)
+        box = np.array([[bounds[0, 0], sides[0, 1], low], [sides[1, 0], sides[1, 1], high]])
+        # A side that no camera sees does not make a slice narrow.
+        box[0, 1], box[1, 1] = min(box[0, 1], bounds[0, 1]), max(box[1, 1], bounds[1, 1])
+        if bounds[1, 0] - box[1, 0] < 0.04:
+            box[1, 0] = bounds[1, 0]
+        before = slices[-1] if slices else None
+        if before is not None and (np.abs(before - box)[:, :2] < _ALIKE).all():
+            before[:, :2] = np.stack(
+                [np.minimum(before[0, :2], box[0, :2]), np.maximum(before[1, :2], box[1, :2])]
+            )
+            before[1, 2] = high
+        else:
+            slices.append(box)
+    return np.array(slices).reshape(-1, 2, 3)

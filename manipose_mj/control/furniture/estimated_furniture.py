@@ -1,0 +1,306 @@
+"""The furniture of an episode as cameras and the hand know it: found, followed, measured once it is open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from dm_control import mjcf
+from jaxtyping import Bool, Float
+
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.furniture.furniture_fit import as_drawer, fit_furniture
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of
+from manipose_mj.control.furniture.opened_part import seen_open
+from manipose_mj.control.furniture.opening_search import found_opening
+from manipose_mj.control.furniture.part_sensing import PartSensor
+from manipose_mj.control.furniture.part_words import Candidate, meant_part
+from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
+from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
+from manipose_mj.errors import InputError
+from manipose_mj.failures import StageFailure
+from manipose_mj.poses import invert, transform
+from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.goals import ShutGoal
+from manipose_mj.tasks.instructions.sentence import asked_parts
+
+_LEAST_POINTS = 1500  # of furniture that is looked at
+_SURE_PART = 0.15  # confidence of parts that nobody asked for
+_END = {"slide": 0.5, "hinge": 0.8}  # of the usual range, from which on a stop is its end
+_NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Attributes: name; start: the TCP's place in the object frame with the part shut `(3,)` [m]."""
+
+    name: str
+    start: Float[np.ndarray, "3"]
+
+
+class EstimatedFurniture:
+    """One piece of furniture, from clouds, its instance mask and its category."""
+
+    def __init__(
+        self,
+        task: ManipulationTask,
+        physics: mjcf.Physics,
+        views: SceneViews,
+        front_cameras: tuple[str, ...],
+        sense: PartSensor,
+    ) -> None:
+        """Looks at nothing yet.
+
+        Args:
+          task: Says which furniture there is, by category and mask, and what an instruction calls its parts.
+          physics: That the sensors measure.
+          views: Of all cameras.
+          front_cameras: Those that see what the robot faces, the highest first.
+          sense: Finds handles and joints.
+        """
+        self._task, self._physics, self._views = task, physics, views
+        self._front_cameras, self._sense = front_cameras, sense
+        self.model: FurnitureModel | None = None
+        self._mask = 0
+        self._held: _Held | None = None
+        self._moved: set[str] = set()
+
+    def reset(self, key: Any) -> None:
+        """Look at the furniture of the episode.
+
+        Raises:
+          StageFailure: No part is found that a goal could mean.
+        """
+        self.model, self._held, self._moved = None, None, set()
+        for category, mask in self._task.furniture_masks:
+            self._mask = mask
+            seen = self._cloud(self._front_cameras)
+            if len(seen.points) < _LEAST_POINTS:
+                raise StageFailure("perception", f"no camera sees enough of the {category}")
+            pose = self._views.camera_pose(self._physics, self._front_cameras[0])
+            cloud, asked = self._cloud(), asked_parts(self._task)
+            found: list[FurnitureModel] = []
+            # Through all cameras as well where what stands open did not show.
+            for each in (seen, cloud):
+                try:
+                    sensed = self._sense(each, pose, key)
+                except InputError as error:
+                    raise StageFailure("perception", f"{category}: {error}") from None
+                model = fit_furniture(cloud, sensed, category)
+                found.append(_named(model, asked, self._expected_open))
+                parts = {part.name: part.opening for part in found[-1].parts}
+                if all(parts[name] > 0 for name in self._expected_open):
+                    break
+            else:
+                found.reverse()
+            self.model = found[-1]
+
+    @property
+    def _expected_open(self) -> frozenset[str]:
+        """Parts that shall be shut, and not opened before: they stand open."""
+        goals = self._task.goals
+        others = {getattr(goal, "part", None) for goal in goals if not isinstance(goal, ShutGoal)}
+        return frozenset(
+            goal.part for goal in goals if isinstance(goal, ShutGoal) and goal.part not in others
+        )
+
+    def part_poses(self) -> dict[str, Float[np.ndarray, "4 4"]]:
+        """`T_world_part` of all parts."""
+        model = self.model
+        if model is None:
+            return {}
+        return {part.name: model.pose @ part.motion(part.opening) for part in model.parts}
+
+    def parts(
+        self,
+        bodies: Mapping[str, int],
+        geoms: Mapping[str, Bool[np.ndarray, "ngeom"]],
+        objects: Mapping[str, ObjectEstimate],
+    ) -> dict[str, PartEstimate]:
+        """What planners know of the parts.
+
+        Args:
+          bodies: In the planning scene, by the parts' names.
+          geoms: Likewise.
+          objects: Some may lie in a drawer.
+        """
+        model = self.model
+        if model is None:
+            return {}
+        return {
+            part.name: PartEstimate(
+                name=part.name,
+                base_pose=model.pose,
+                pose=model.pose @ part.motion(part.opening),
+                opening=part.opening,
+                joint=part.part.joint,
+                handle=_handle(part),
+                cavity=part.part.cavity,
+                body=bodies[part.name],
+                geoms=geoms[part.name],
+                bodies_inside=_inside(model, part, objects),
+                cavity_seen=part.seen_inside,
+            )
+            for part in model.parts
+        }
+
+    def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
+        """The hand holds this from now on."""
+        part = self._part(name)
+        if self._held is not None:
+            self._moved.add(self._held.name)
+        self._held = None
+        if part is not None and self.model is not None:
+            back = invert(part.motion(part.opening)) @ invert(self.model.pose)
+            self._held = _Held(part.name, transform(back, tcp_pose[None, :3, 3])[0])
+
+    def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
+        """Find out how far parts are open now."""
+        model = self.model
+        if model is None:
+            return
+        if self._held is not None:
+            part = self._part(self._held.name)
+            assert part is not None
+            now = transform(invert(model.pose), tcp_pose[None, :3, 3])[0]
+            opening = opening_of(part.part.joint, self._held.start, now)
+            self.model = model.with_part(part.at(opening))
+            return
+        touched = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
+        if touched:
+            points = self._points()
+            for part in touched:
+                opening = found_opening(part, points)
+                self.model = self.model.with_part(part.at(opening)) if self.model else None
+        self._moved = {
+            part.name for part in touched if self._near(part, tcp_pose)
+        }  # looked at again until the hand is gone
+
+    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """Correct a joint by the way the hand went with the part; where it stopped, it goes no further.
+
+        Args:
+          name: Of the part.
+          path: Of the TCP that held its handle, world frame [m].
+          stopped: Whether the part went no further.
+        """
+        model, part = self.model, self._part(name)
+        if model is None or part is None or self._held is None:
+            return
+        own = transform(invert(model.pose), path)
+        started = opening_of(part.part.joint, self._held.start, own[0])
+        joint = fitted_joint(part.part.joint, own).joint
+        gone = opening_of(joint, own[0], own[-1])
+        opening = started + gone
+        low, high = joint.range
+        # A hand that slips off before is none that came to the end.
+        ends = stopped and opening > _END[joint.kind] * high
+        joint = replace(joint, range=(low, opening if ends else max(high, opening)))
+        moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
+        # Where the hand would be were the part shut, by the joint as it is known now.
+        back = invert(moved.motion(opening))
+        self._held = _Held(name, transform(back, own[-1][None])[0])
+        self.model = model.with_part(moved)
+
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        part = self._part(name)
+        if part is not None and self.model is not None:
+            self.model = self.model.with_part(part.at(max(opening, 0.0)))
+            self._moved.add(name)
+
+    def look_again(self) -> None:
+        """Measure panels and cavities of what stands open."""
+        model = self.model
+        if model is None:
+            return
+        cloud = self._cloud()
+        points = transform(invert(model.pose), cloud.points)
+        for part in model.parts:
+            if part.opening > 0.0:
+                found = part.at(found_opening(part, points))
+                # What does not show stays as it is usual: nobody need look again.
+                model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
+        self.model = model
+
+    def _part(self, name: str | None) -> PartModel | None:
+        parts = () if self.model is None else self.model.parts
+        return next((part for part in parts if part.name == name), None)
+
+    def _may_have_moved(self, part: PartModel, tcp_pose: Float[np.ndarray, "4 4"]) -> bool:
+        return part.name in self._moved or self._near(part, tcp_pose)
+
+    def _near(self, part: PartModel, tcp_pose: Float[np.ndarray, "4 4"]) -> bool:
+        assert self.model is not None
+        handle = self.model.pose @ part.motion(part.opening) @ _handle(part).pose
+        return float(np.linalg.norm(handle[:3, 3] - tcp_pose[:3, 3])) < _NEAR
+
+    def _cloud(self, cameras: tuple[str, ...] | None = None) -> SceneCloud:
+        return self._views.cloud(self._physics, self._mask, cameras=cameras)
+
+    def _points(self) -> Float[np.ndarray, "n 3"]:
+        assert self.model is not None
+        cloud = self._views.cloud(self._physics, self._mask, normals=False)
+        return transform(invert(self.model.pose), cloud.points)
+
+
+def _named(
+    model: FurnitureModel, asked: Mapping[str, str], expected_open: frozenset[str]
+) -> FurnitureModel:
+    """The parts that words mean called as goals call them; others only where they are sure.
+
+    Args:
+      model: With parts of any names.
+      asked: Words for parts, by the names that goals have.
+      expected_open: Of these names, those of parts that stand open.
+
+    Raises:
+      StageFailure: There is none.
+    """
+    parts = list(model.parts)
+    for name, words in asked.items():
+        free = [i for i, part in enumerate(parts) if part.name not in asked]
+        opened = [i for i in free if parts[i].opening > 0]
+        # What shall be shut stands open.
+        free = opened if name in expected_open and opened else free
+        index = meant_part(words, [_candidate(parts[i]) for i in free])
+        if index is None:
+            raise StageFailure("perception", f"no camera shows the {words} of the {model.category}")
+        chosen = parts[free[index]]
+        if "drawer" in words.split() and chosen.part.joint.kind == "hinge":
+            chosen = as_drawer(chosen)
+        parts[free[index]] = replace(chosen, part=replace(chosen.part, name=name))
+    kept = [part for part in parts if part.name in asked or part.confidence >= _SURE_PART]
+    return replace(model, parts=tuple(kept))
+
+
+def _candidate(part: PartModel) -> Candidate:
+    """How words see it: a drawer's handle is in its middle, a door's near an edge."""
+    low, high = part.panel[:, 1]
+    middle = abs(float(_handle(part).origin[1]) - (low + high) / 2) / max(high - low, 0.01)
+    return Candidate(part.part, part.confidence, 2 * middle)
+
+
+def _inside(
+    model: FurnitureModel, part: PartModel, objects: Mapping[str, ObjectEstimate]
+) -> tuple[int, ...]:
+    """Bodies of the objects in a drawer's cavity."""
+    cavity = part.part.cavity
+    if cavity is None or not cavity.moves_with_part:
+        return ()
+    to_part = invert(model.pose @ part.motion(part.opening))
+    return tuple(
+        obj.body
+        for obj in objects.values()
+        if (
+            np.abs((to_part @ obj.label_pose)[:3, 3] - cavity.center) < cavity.extents / 2 + 0.01
+        ).all()
+    )
+
+
+def _handle(part: PartModel) -> PoseLabel:
+    assert part.part.handle is not None  # all parts that are found are found by it
+    return part.part.handle

@@ -1,0 +1,330 @@
+"""From a cloud of furniture and the parts that were sensed in it to its model in boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import Cavity, MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.body_shape import body_slices, ends_of
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
+from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import compose, invert, transform
+
+# How far parts open in the median of the training furniture: of the depth, [m]; [rad].
+DRAWER_SHARE, TYPICAL_DRAWER = 0.70, 0.32
+TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
+LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
+_SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
+_AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m, rad]
+_PANEL = 0.018  # thickness [m]
+_WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
+_REAR = 0.03  # behind them [m]
+_FACING = 0.6  # cosine between normals of the front and X, at least
+# How far points of a panel's plane are from it [m]; points that tell its sides.
+_FACE, _FACE_LEAST = 0.012, 150
+_FREE_EDGE = 0.05  # of a door, from its handle [m]
+_TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
+_MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
+_ONE_HINGE = 0.04  # hinges nearer than this are one [m]
+_UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
+_MEET = 0.01  # handles nearer than this are one [m]
+_LOOKS = 500
+
+
+def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> FurnitureModel:
+    """The model of a piece of furniture.
+
+    Args:
+      cloud: Of it alone.
+      sensed: Its front and parts.
+      category: Such as `"cabinet"`.
+    """
+    pose = _object_pose(cloud, sensed)
+    points = transform(invert(pose), cloud.points)
+    normals = cloud.normals @ pose[:3, :3]
+    shut = [_as_if_shut(part, pose) for part in sensed.parts]
+    bounds = _bounds(points, normals, shut)
+    if any(part.opening == 0.0 for part in shut):
+        for part in shut:
+            part.meet_front(points, normals, float(bounds[1, 0]))
+    parts = [
+        _part(number, part, shut, points, normals, bounds, category)
+        for number, part in enumerate(shut)
+    ]
+    parts = _distinct(parts)
+    return FurnitureModel(pose, body_slices(points, bounds), tuple(parts), category)
+
+
+def _distinct(parts: list[PartModel]) -> list[PartModel]:
+    """Of parts whose fitted handles meet, or that turn about one hinge, the surest."""
+    kept: list[PartModel] = []
+    for part in sorted(parts, key=lambda part: -part.confidence):
+        low, high = part.handle[0] + [[-_MEET], [_MEET]]
+        meets = [((low < o.handle[0, 1]) & (high > o.handle[0, 0])).all() for o in kept]
+        if not any(meets) and not any(_one_door(part, other) for other in kept):
+            kept.append(part)
+    return kept
+
+
+def _one_door(part: PartModel, other: PartModel) -> bool:
+    """Whether two parts turn about one hinge, at one height."""
+    mine, its = part.part.joint, other.part.joint
+    if mine.kind != "hinge" or its.kind != "hinge" or mine.axis @ its.axis < np.cos(0.2):
+        return False
+    apart = np.cross(mine.origin - its.origin, its.axis)
+    overlap = np.minimum(part.panel[1], other.panel[1]) - np.maximum(part.panel[0], other.panel[0])
+    return float(np.linalg.norm(apart)) < _ONE_HINGE and bool((overlap[1:] > 0.05).all())
+
+
+def _object_pose(cloud: SceneCloud, sensed: SensedFurniture) -> Float[np.ndarray, "4 4"]:
+    """`T_world_object`: upright, X out of the front."""
+    # Handles of shut parts know the front better than the body's planes do.
+    ways = [sensed.front]
+    for part in sensed.parts[:6]:
+        way = part.handle[:3, 1] * [1, 1, 0]
+        if part.opening < _AJAR[part.kind] and way @ sensed.front > np.cos(0.1):
+            ways.append(way / np.linalg.norm(way))
+    x = np.median(ways, axis=0) if len(ways) > 2 else sensed.front
+    x = x / np.linalg.norm(x)
+    z = np.array([0.0, 0.0, 1.0])
+    rotation = np.stack([x, np.cross(z, x), z], axis=1)
+    return compose(rotation, np.median(cloud.points, axis=0))
+
+
+class _Shut:
+    """A sensed part in the object frame, as if it were shut.
+
+    Attributes: sensed; kind; opening; axis; origin; handle: `T_object_handle`.
+    """
+
+    def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
+        self.sensed = sensed
+        self.kind: Literal["slide", "hinge"] = sensed.kind
+        to_object = invert(pose)
+        axis = to_object[:3, :3] @ sensed.axis
+        self.axis = _snapped(axis / np.linalg.norm(axis))
+        self.origin = transform(to_object, sensed.origin[None])[0]
+        self.opening = sensed.opening if sensed.opening > _AJAR[sensed.kind] else 0.0
+        joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
+        back = _motion(joint, -self.opening)
+        self.handle = back @ to_object @ sensed.handle
+        self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
+        self.back = back
+
+    def meet_front(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float
+    ) -> None:
+        """Correct how far a drawer is open: shut, its panel is where those of others are, along X [m]."""
+        if self.kind != "slide" or self.opening == 0.0 or self.axis[0] < _SNAP:
+            return
+        own = _panel_place(transform(self.back, points), normals, self)
+        if own is not None and abs(own - front) < _MISTAKEN:
+            self.opening += own - front
+            self.back = compose(np.eye(3), -self.opening * self.axis)
+            self.handle[:3, 3] -= (own - front) * self.axis
+
+
+def _as_if_shut(part: SensedPart, pose: Float[np.ndarray, "4 4"]) -> _Shut:
+    return _Shut(part, pose)
+
+
+def _motion(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
+    empty = np.zeros((0, 2, 3))
+    moving = MovingPart("", joint, None, None)
+    return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)
+
+
+def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    nearest = int(np.abs(axis).argmax())
+    if abs(axis[nearest]) < _SNAP:
+        return axis
+    return np.eye(3)[nearest] * np.sign(axis[nearest])
+
+
+def _along_axes(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """Along the axes of the body, where that is nearly so."""
+    nearest = np.round(rotation)
+    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > _SNAP:
+        return nearest
+    return rotation
+
+
+def _bounds(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], shut: Sequence[_Shut]
+) -> Float[np.ndarray, "2 3"]:
+    """Low and high corner of the body; its front is where the panels of shut parts are."""
+    low, high = ends_of(points)
+    fronts = [_panel_place(points, normals, part) for part in shut if part.opening == 0.0]
+    fronts = [front for front in fronts if front is not None]
+    opened = [part for part in shut if part.opening > 0.0]
+    if fronts:
+        high[0] = float(np.median(fronts))
+    if opened:
+        front = high[0] if fronts else max(part.handle[0, 3] - 0.035 for part in opened)
+        high[0] = front
+        body = points[points[:, 0] < front]
+        if len(body) > 200:
+            low, ends = ends_of(body)
+            high[1:] = ends[1:]
+    return np.stack([low, high])
+
+
+def _panel_place(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], part: _Shut
+) -> float | None:
+    """Where along X the panel behind a handle is [m]; None where it does not show."""
+    facing = normals[:, 0] > _FACING
+    local = points[facing] - part.handle[:3, 3]
+    near = (np.abs(local[:, 1:]) < 0.10).all(axis=1) & (local[:, 0] < 0.03)
+    near &= local[:, 0] > -0.09
+    if near.sum() < 30:
+        return None
+    counts, edges = np.histogram(local[near, 0], bins=np.arange(-0.092, 0.034, 0.003))
+    smooth = np.convolve(counts, np.ones(3), mode="same")
+    best = int(smooth.argmax())
+    close = near & (np.abs(local[:, 0] - edges[best] - 0.0015) < 0.006)
+    return float(np.median(local[close, 0]) + part.handle[0, 3])
+
+
+def _part(
+    number: int,
+    part: _Shut,
+    others: Sequence[_Shut],
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    bounds: Float[np.ndarray, "2 3"],
+    category: str,
+) -> PartModel:
+    """One part: its panel is what is nearer to its handle than to those of others."""
+    moved = transform(part.back, points)
+    turned = normals @ part.back[:3, :3].T
+    front = _panel_place(moved, turned, part)
+    if front is None:
+        front = float(bounds[1, 0])
+    panel = _panel(part, others, bounds, front)
+    panel = _within_face(panel, moved[turned[:, 0] > _FACING], part)
+    low, high = panel
+    on = ((moved > low - 0.006) & (moved < high + 0.006)).all(axis=1)
+    handle, seen = handle_label(moved, part.handle, front)
+    held = np.abs(transform(invert(handle.pose), moved)) < handle.extents / 2 + 0.006
+    rows = np.flatnonzero(on | held.all(axis=1))
+    rows = np.random.default_rng(number).permutation(rows)[:_LOOKS]
+    depth = float(bounds[1, 0] - bounds[0, 0])
+    joint = Joint(part.kind, part.origin, part.axis, (0.0, _range(part, depth, category)))
+    name = f"part_{number}"
+    cavity = _cavity(part, panel, bounds, joint.range[1])
+    return PartModel(
+        part=MovingPart(name, joint, handle, cavity),
+        panel=panel,
+        handle=handle_boxes(handle, front),
+        opening=part.opening,
+        confidence=part.sensed.confidence * (1.0 if seen else _UNSEEN),
+        looks=moved[rows],
+    )
+
+
+def as_drawer(part: PartModel) -> PartModel:
+    """The same part, known to slide: straight out of the front."""
+    handle, panel = part.part.handle, part.panel
+    assert handle is not None
+    joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, TYPICAL_DRAWER))
+    low, high = panel[0] + [0.0, _WALL, _WALL], panel[1] - [0.0, _WALL, _WALL]
+    low[0], high[0] = panel[0, 0] - TYPICAL_DRAWER, panel[0, 0]
+    cavity = None
+    if (high - low > 0.04).all():
+        cavity = Cavity((low + high) / 2, high - low, moves_with_part=True)
+    return replace(part, part=MovingPart(part.name, joint, handle, cavity), opening=0.0)
+
+
+def _range(part: _Shut, depth: float, category: str) -> float:
+    """How far the part may open [m or rad]: as is usual."""
+    if part.kind == "slide":
+        # The rear of what is deep, or stands at an angle, is out of all cameras' sight.
+        return max(DRAWER_SHARE * depth, TYPICAL_DRAWER, part.opening)
+    level = abs(part.axis[2]) < 0.7
+    usual = LEVEL_SWING if level else TYPICAL_SWING.get(category, ANY_SWING)
+    return max(usual, part.opening)
+
+
+def _panel(
+    part: _Shut, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"], front: float
+) -> Float[np.ndarray, "2 3"]:
+    """The rectangle between the handles of neighbours, the hinge and the body's sides."""
+    low, high = bounds[0].copy(), bounds[1].copy()
+    own = part.handle[:3, 3]
+    half = _half_handle(part)
+    for other in others:
+        if other is part or other.sensed.confidence < 0.15:
+            continue
+        away = other.handle[:3, 3] - own
+        axis = 2 if abs(away[2]) > abs(away[1]) else 1
+        if abs(away[axis]) < 0.05:
+            continue
+        middle = own[axis] + away[axis] / 2
+        if away[axis] > 0:
+            high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
+        else:
+            low[axis] = max(low[axis], min(middle, own[axis] - half[axis]))
+    if part.kind == "hinge":
+        axis = 1 if abs(part.axis[2]) > 0.7 else 2
+        if part.origin[axis] > own[axis]:
+            high[axis] = part.origin[axis] + 0.006
+            edge = own[axis] - half[axis] - _FREE_EDGE
+            low[axis] = low[axis] if own[axis] - low[axis] < _TO_SIDE else max(edge, low[axis])
+        else:
+            low[axis] = part.origin[axis] - 0.006
+            edge = own[axis] + half[axis] + _FREE_EDGE
+            high[axis] = high[axis] if high[axis] - own[axis] < _TO_SIDE else min(edge, high[axis])
+    low[0], high[0] = front - _PANEL, front
+    return np.stack([low, high])
+
+
+def _within_face(
+    panel: Float[np.ndarray, "2 3"], points: Float[np.ndarray, "n 3"], part: _Shut
+) -> Float[np.ndarray, "2 3"]:
+    """As much of a panel as its plane has points for: below there may be a plinth, behind the front."""
+    on = np.abs(points[:, 0] - panel[1, 0]) < _FACE
+    on &= ((points > panel[0] - 0.01) & (points < panel[1] + 0.01))[:, 1:].all(axis=1)
+    if on.sum() < _FACE_LEAST:
+        return panel
+    low, high = ends_of(points[on])
+    found = panel.copy()
+    own, half = part.handle[:3, 3], _half_handle(part)
+    for axis in (1, 2):
+        found[0, axis] = min(max(panel[0, axis], low[axis] - 0.005), own[axis] - half[axis])
+        found[1, axis] = max(min(panel[1, axis], high[axis] + 0.005), own[axis] + half[axis])
+    return found
+
+
+def _half_handle(part: _Shut) -> Float[np.ndarray, "3"]:
+    return np.abs(part.handle[:3, 0]) * 0.05 + 0.01
+
+
+def _cavity(
+    part: _Shut,
+    panel: Float[np.ndarray, "2 3"],
+    bounds: Float[np.ndarray, "2 3"],
+    most: float,
+) -> Cavity | None:
+    """What may be behind a panel: a guess until it is open."""
+    low, high = panel[0].copy(), panel[1].copy()
+    high[0] = panel[0, 0]
+    if part.kind == "slide":
+        low[0] = high[0] - most
+        low[1:] += _WALL
+        high[1:] -= _WALL
+    else:
+        low[0] = bounds[0, 0] + _REAR
+        low[1:] += _DOOR_WALL
+        high[1:] -= _DOOR_WALL
+    if (high - low < 0.04).any():
+        return None
+    return Cavity((low + high) / 2, high - low, moves_with_part=part.kind == "slide")

@@ -1,0 +1,116 @@
+"""A piece of furniture as boxes, with parts that move: what clouds of it are made into.
+
+The object frame is upright: X out of the front, Z up. All boxes are of that frame, with the parts shut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import Cavity, MovingPart
+from manipose_mj.control.furniture.boxes import Boxes, without
+from manipose_mj.poses import compose, rotation_about
+
+_TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]
+_BEFORE_FRONT = 0.03  # by how much a hole reaches out of the front [m]
+
+
+@dataclass(frozen=True)
+class PartModel:
+    """A drawer or door.
+
+    Attributes:
+      part: Its name, joint, handle and cavity, object frame.
+      panel: What shuts the opening, without the handle: low and high corner [m].
+      handle: Boxes of the handle.
+      opening: As it stands [m or rad].
+      confidence: Of its estimate.
+      looks: `(n, 3)`, points that were seen on it, as if it were shut [m].
+      seen_inside: Whether the cavity was measured; else it is a guess.
+    """
+
+    part: MovingPart
+    panel: Float[np.ndarray, "2 3"]
+    handle: Boxes
+    opening: float
+    confidence: float
+    looks: Float[np.ndarray, "n 3"]
+    seen_inside: bool = False
+
+    @property
+    def name(self) -> str:
+        """What plans call it."""
+        return self.part.name
+
+    @property
+    def boxes(self) -> Boxes:
+        """All that moves."""
+        boxes = [self.panel[None], self.handle]
+        cavity = self.part.cavity
+        if cavity is not None and cavity.moves_with_part:
+            boxes.append(_tray(cavity, self.panel))
+        return np.concatenate(boxes)
+
+    def motion(self, opening: float) -> Float[np.ndarray, "4 4"]:
+        """How it has moved at another opening [m or rad], object frame."""
+        joint = self.part.joint
+        if joint.kind == "slide":
+            return compose(np.eye(3), joint.axis * opening)
+        rotation = rotation_about(joint.axis, opening)
+        return compose(rotation, joint.origin - rotation @ joint.origin)
+
+    def at(self, opening: float) -> PartModel:
+        """The same, as far open [m or rad]."""
+        return replace(self, opening=opening)
+
+
+@dataclass(frozen=True)
+class FurnitureModel:
+    """A piece of furniture.
+
+    Attributes:
+      pose: `T_world_object`.
+      solid: Boxes of all that stands still, as if there were no cavities.
+      parts: That move.
+      category: Such as `"cabinet"`.
+    """
+
+    pose: Float[np.ndarray, "4 4"]
+    solid: Boxes
+    parts: tuple[PartModel, ...]
+    category: str
+
+    @property
+    def fixed(self) -> Boxes:
+        """What stands still, with a hole for every part and its cavity."""
+        boxes = self.solid
+        for part in self.parts:
+            hole = part.panel.copy()
+            hole[1, 0] += _BEFORE_FRONT
+            boxes = without(boxes, hole)
+            cavity = part.part.cavity
+            if cavity is not None:
+                low, high = cavity.center - cavity.extents / 2, cavity.center + cavity.extents / 2
+                boxes = without(
+                    boxes, np.array([low, [max(high[0], part.panel[1, 0]), high[1], high[2]]])
+                )
+        return boxes
+
+    def with_part(self, part: PartModel) -> FurnitureModel:
+        """The same with another state of the part of that name."""
+        return replace(self, parts=tuple(part if p.name == part.name else p for p in self.parts))
+
+
+def _tray(cavity: Cavity, panel: Float[np.ndarray, "2 3"]) -> Boxes:
+    """Floor, sides and back of a drawer around its cavity."""
+    low, high = cavity.center - cavity.extents / 2, cavity.center + cavity.extents / 2
+    end = panel[0, 0]
+    top = high[2] - 0.015
+    floor = [[low[0], low[1], low[2] - _TRAY_FLOOR], [end, high[1], low[2]]]
+    left = [[low[0], low[1] - _TRAY_SIDE, low[2]], [end, low[1], top]]
+    right = [[low[0], high[1], low[2]], [end, high[1] + _TRAY_SIDE, top]]
+    back = [[low[0] - _TRAY_SIDE, low[1], low[2]], [low[0], high[1], top]]
+    return np.array([floor, left, right, back])

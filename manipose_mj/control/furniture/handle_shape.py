@@ -1,0 +1,107 @@
+"""How long, wide and deep a handle is, from the points that stand out of its panel."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.furniture.boxes import Boxes
+from manipose_mj.poses import SymmetryGroup, invert, transform
+
+_HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
+# Of a handle's lengths, to keep clear of: round ones fill no box, and fingers close on them.
+_SOLID = np.array([1.0, 0.8, 0.7])
+_TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
+_USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
+_STANDING = 0.012  # how far points of a handle are before its panel [m]
+
+
+def handle_label(
+    points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
+) -> tuple[PoseLabel, bool]:
+    """A handle with its lengths, as far as points show it, and whether they do.
+
+    Args:
+      points: Of the furniture, object frame, its part shut [m].
+      handle: `T_object_handle` as it was estimated.
+      front: Of the panel, along X [m].
+    """
+    label, seen = _measured(points, handle, front)
+    if seen:
+        # A knob that was estimated beside itself shows in full from its own middle.
+        label, seen = _measured(points, label.pose, front)
+    return label, seen
+
+
+def _measured(
+    points: Float[np.ndarray, "n 3"], handle: Float[np.ndarray, "4 4"], front: float
+) -> tuple[PoseLabel, bool]:
+    """As `handle_label`, from points around where the handle was estimated."""
+    if handle[0, 3] < front + _STANDING:
+        handle = handle.copy()
+        handle[0, 3] = front + _USUAL_HEIGHT
+    local = transform(invert(handle), points)
+    panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
+    standing = local[:, 1] > min(panel + _STANDING, -0.006)
+    on = standing & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH) & (local[:, 1] < 0.03)
+    on &= np.abs(local[:, 0]) < 0.35
+    if on.sum() < 12:
+        usual = np.array([0.10, 0.012, 0.012])
+        return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
+    along = _run(local[on, 0], 0.025)
+    on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
+    # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
+    across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
+    length = max(along[1] - along[0], 0.012)
+    # Of the bar, its front shows, and a side.
+    sides = np.percentile(local[on, 2], [8, 92])
+    front_side = float(np.percentile(local[on, 1], 85))
+    middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
+    middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
+    if length > 0.045:
+        middle = middle + handle[:3, 1] * (front_side - 0.005)
+    else:
+        middle = middle + handle[:3, 1] * (front_side + panel) / 2
+    depth = 0.012 if length > 0.045 else max(front_side - panel, 0.015)
+    extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
+    if length <= 0.045:
+        # A knob: as wide one way as the other, down to the panel.
+        side = float(np.clip(max(length, across), 0.014, 0.045))
+        extents = np.array([side, depth, side])
+    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS), True
+
+
+def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
+    """The run of values around 0 without a gap [m]."""
+    values = np.sort(along)
+    low = high = float(values[np.abs(values).argmin()])
+    for value in values[values > high]:
+        if value - high > gap:
+            break
+        high = float(value)
+    for value in values[values < low][::-1]:
+        if low - value > gap:
+            break
+        low = float(value)
+    return low, high
+
+
+def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
+    """The bar, and what carries it at both ends; a knob is one box. Object frame."""
+    # Handles are along an axis of the front, or nearly so: boxes around them.
+    turn = np.abs(handle.rotation)
+    half = turn @ (handle.extents * _SOLID) / 2
+    boxes = [np.stack([handle.origin - half, handle.origin + half])]
+    if handle.extents[0] > 0.045:
+        post = turn @ (np.array([0.012, 0.0, handle.extents[2]]) / 2)
+        for sign in (1.0, -1.0):
+            end = handle.origin + sign * handle.rotation[:, 0] * (handle.extents[0] / 2 - 0.006)
+            low, high = end - post, end + post
+            low[0], high[0] = front, handle.origin[0]
+            boxes.append(np.stack([low, high]))
+    else:
+        across = np.abs(boxes[0][1, 1:] - boxes[0][0, 1:]).min() / 2
+        boxes[0][:, 1:] = handle.origin[1:] + np.array([[-across], [across]])
+        boxes[0][0, 0] = min(boxes[0][0, 0], front)
+    return np.stack(boxes)

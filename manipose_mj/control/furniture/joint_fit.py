@@ -1,0 +1,140 @@
+"""A joint from the way that a point of its part went: the arc of the gripper on a handle is the best sensor of a hinge.
+
+The estimate from clouds is the prior; the points that the gripper went through correct it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares
+
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.poses import rotation_about
+
+_NOISE = 0.0015  # of the gripper on a bar [m]
+_AXIS = np.radians(15.0)  # standard deviations of what clouds say: of an axis' direction,
+_PLACE = 0.06  # and of a hinge's place [m]
+_SHORT = 0.006  # ways that are shorter tell nothing [m]
+_CURVED = 3.0  # how many times better a hinge must fit for a drawer to be a door
+_LEAST_RADIUS = 0.05  # of hinges, from the handle [m]
+
+
+@dataclass(frozen=True)
+class FittedJoint:
+    """Attributes: joint; misfit: root mean square distance of the points from its path [m]."""
+
+    joint: Joint
+    misfit: float
+
+
+def fitted_joint(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
+    """The joint, corrected.
+
+    Args:
+      joint: As clouds have it; its axis points to where it opens.
+      path: Of one point of the part, in the joint's frame, as it opens; the first is where it began [m].
+    """
+    gone = float(np.linalg.norm(path - path[0], axis=1).max())
+    if gone < _SHORT:
+        return FittedJoint(joint, 0.0)
+    if joint.kind == "hinge":
+        return _fitted_hinge(joint, path)
+    straight = _fitted_slide(joint, path)
+    if straight.misfit < 2 * _NOISE or gone < 0.05:
+        return straight
+    turned = _hinge_of(straight.joint, path)
+    if turned is not None and turned.misfit * _CURVED < straight.misfit:
+        return turned
+    return straight
+
+
+def _fitted_slide(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
+    offset = path - path[0]
+    _, _, directions = np.linalg.svd(offset)
+    along = directions[0] * np.sign(directions[0] @ offset[-1])
+    if along @ joint.axis < 0:  # it was pushed shut
+        along = -along
+    length = float(np.linalg.norm(offset, axis=1).max())
+    certain, prior = (length / _NOISE) ** 2, 1 / _AXIS**2
+    axis = (certain * along + prior * joint.axis) / (certain + prior)
+    axis /= np.linalg.norm(axis)
+    off = offset - (offset @ axis)[:, None] * axis
+    misfit = float(np.sqrt((off**2).sum(axis=1).mean()))
+    return FittedJoint(replace(joint, axis=axis), misfit)
+
+
+def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
+    """Axis and place that the path circles, near those that clouds say."""
+    first, second = _across(joint.axis)
+    basis = np.stack([first, second], axis=1)
+    # The point of the axis abreast of the handle.
+    foot = joint.origin + ((path[0] - joint.origin) @ joint.axis) * joint.axis
+
+    def changed(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        turn = basis @ by[:2]
+        angle = float(np.linalg.norm(turn))
+        axis = joint.axis
+        if angle > 1e-9:
+            axis = rotation_about(turn / angle, angle) @ axis
+        return axis, foot + basis @ by[2:]
+
+    def residuals(by: np.ndarray) -> np.ndarray:
+        axis, place = changed(by)
+        out, high = _off_circle(path, axis, place)
+        return np.concatenate([out / _NOISE, high / _NOISE, by[:2] / _AXIS, by[2:] / _PLACE])
+
+    found = least_squares(residuals, np.zeros(4), loss="soft_l1", max_nfev=60).x
+    axis, place = changed(found)
+    if np.linalg.norm(np.cross(path[0] - place, axis)) < _LEAST_RADIUS:
+        return FittedJoint(joint, float("inf"))
+    out, high = _off_circle(path, axis, place)
+    misfit = float(np.sqrt((out**2 + high**2).mean()))
+    return FittedJoint(replace(joint, axis=axis, origin=place), misfit)
+
+
+def _hinge_of(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint | None:
+    """A hinge that the path of what was taken for a drawer circles."""
+    offset = path - path[0]
+    _, _, directions = np.linalg.svd(offset - offset.mean(axis=0))
+    normal = directions[2]
+    u, v = directions[0], directions[1]
+    flat = np.column_stack([offset @ u, offset @ v])
+    # x^2 + y^2 = 2 a x + 2 b y + c
+    rows = np.column_stack([2 * flat, np.ones(len(flat))])
+    solution, *_ = np.linalg.lstsq(rows, (flat**2).sum(axis=1), rcond=None)
+    center = path[0] + solution[0] * u + solution[1] * v
+    out = path[0] - center
+    axis = normal * np.sign(np.cross(normal, out) @ joint.axis)
+    if not axis.any() or not _LEAST_RADIUS < np.linalg.norm(out) < 1.2:
+        return None
+    hinge = replace(joint, kind="hinge", axis=axis, origin=center, range=(0.0, 1.75))
+    return _fitted_hinge(hinge, path)
+
+
+def _off_circle(
+    path: Float[np.ndarray, "n 3"], axis: Float[np.ndarray, "3"], place: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
+    """How far points are outside the circle of the first, and above its plane [m]."""
+    arm = path - place
+    high = (path - path[0]) @ axis
+    radii = np.linalg.norm(arm - (arm @ axis)[:, None] * axis, axis=1)
+    return radii - radii[0], high
+
+
+def _across(axis: Float[np.ndarray, "3"]) -> tuple[np.ndarray, np.ndarray]:
+    first = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def opening_of(joint: Joint, start: Float[np.ndarray, "3"], now: Float[np.ndarray, "3"]) -> float:
+    """By how much a joint has moved that took a point from `start` to `now` [m or rad], in its frame."""
+    if joint.kind == "slide":
+        return float((now - start) @ joint.axis)
+    arms = [p - joint.origin for p in (start, now)]
+    arms = [arm - (arm @ joint.axis) * joint.axis for arm in arms]
+    sine = float(np.cross(arms[0], arms[1]) @ joint.axis)
+    return float(np.arctan2(sine, arms[0] @ arms[1]))

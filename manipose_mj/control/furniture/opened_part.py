@@ -1,0 +1,153 @@
+"""What is seen of a part once it is open: how large its panel is, and the cavity that it gives access to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.assets.asset import Cavity
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import invert, transform
+
+# Open so far, a part shows what is behind it [m, rad].
+_TELLING = {"slide": 0.10, "hinge": 0.7}
+_PLANE = 0.010  # how far points of a panel are from its plane [m]
+_BEYOND = 0.08  # by how much a panel may be larger than was guessed [m]
+_FLAT, _FACING = 0.8, 0.75  # cosines of normals to an axis
+_LEAST = 25  # points that tell a side
+_BIN = 0.005  # [m]
+_SIDE_MARGIN = 0.004  # kept off sides that were measured [m]
+_UNSEEN = 0.02  # and off those that were not, from the panel's edges [m]
+_ROOF = 0.015  # below the panel's upper edge [m]
+
+
+def seen_open(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
+    """The part with what its open state shows; as it was where that is nothing.
+
+    Args:
+      model: The furniture.
+      part: One of it, at its present opening.
+      cloud: Of the furniture now, with normals.
+    """
+    kind = part.part.joint.kind
+    if part.opening < _TELLING[kind]:
+        return part
+    to_object = invert(model.pose)
+    points = transform(to_object, cloud.points)
+    normals = cloud.normals @ model.pose[:3, :3]
+    if kind == "slide":
+        back = invert(part.motion(part.opening))
+        return _drawer(part, transform(back, points), normals)
+    return _door(model, part, points, normals)
+
+
+def _drawer(
+    part: PartModel, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+) -> PartModel:
+    """From points as they would be were the drawer shut: what stands out of the body is the drawer's."""
+    panel = _measured_panel(part, points, normals)
+    front, opening = panel[1, 0], part.opening
+    # Out of the body now: shut, it would be behind the front by less than the opening.
+    inside = (points[:, 0] < front - 0.008) & (points[:, 0] > front - opening + 0.02)
+    for axis in (1, 2):
+        inside &= (points[:, axis] > panel[0, axis]) & (points[:, axis] < panel[1, axis])
+    thickness = 0.018
+    back = inside & (normals[:, 0] < -_FACING) & (points[:, 0] > front - 0.05)
+    if back.sum() >= _LEAST:
+        thickness = float(np.clip(front - np.median(points[back, 0]), 0.008, 0.04))
+    floor, left, right = _floor_and_sides(points, normals, inside, panel)
+    low = np.array([front - opening, left, floor])
+    high = np.array([front - thickness, right, panel[1, 2] - _ROOF])
+    panel[0, 0] = front - thickness
+    if (high - low < 0.03).any():
+        return replace(part, panel=panel)
+    cavity = Cavity((low + high) / 2, high - low, moves_with_part=True)
+    return replace(part, panel=panel, part=replace(part.part, cavity=cavity), seen_inside=True)
+
+
+def _door(
+    model: FurnitureModel,
+    part: PartModel,
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+) -> PartModel:
+    """From what shows through the opening."""
+    low, high = part.panel
+    front = high[0]
+    inside = points[:, 0] < front - 0.025
+    for axis in (1, 2):
+        inside &= (points[:, axis] > low[axis] - 0.01) & (points[:, axis] < high[axis] + 0.01)
+    inside &= points[:, 0] > model.solid[:, 0, 0].min() + 0.006
+    if inside.sum() < 4 * _LEAST:
+        return part
+    floor, left, right = _floor_and_sides(points, normals, inside, part.panel)
+    # The rear: where most points look out of the front.
+    facing = inside & (normals[:, 0] > _FACING)
+    rear = float(np.percentile(points[inside, 0], 3))
+    if facing.sum() >= _LEAST:
+        rear = _mode(points[facing, 0]) + 0.004
+    hole_low = np.array([rear, left, floor])
+    hole_high = np.array([front - 0.018, right, high[2] - max(_ROOF, 0.02)])
+    if (hole_high - hole_low < 0.05).any():
+        return part
+    cavity = Cavity((hole_low + hole_high) / 2, hole_high - hole_low, moves_with_part=False)
+    return replace(part, part=replace(part.part, cavity=cavity), seen_inside=True)
+
+
+def _measured_panel(
+    part: PartModel, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """The front of a drawer that is open, from the points in its plane."""
+    panel = part.panel.copy()
+    low, high = panel[0] - _BEYOND, panel[1] + _BEYOND
+    on = np.abs(points[:, 0] - panel[1, 0]) < _PLANE
+    for axis in (1, 2):
+        on &= (points[:, axis] > low[axis]) & (points[:, axis] < high[axis])
+    on &= normals[:, 0] > 0.5
+    if on.sum() < 4 * _LEAST:
+        return panel
+    seen = points[on]
+    for axis in (1, 2):
+        panel[:, axis] = np.percentile(seen[:, axis], [0.7, 99.3])
+    # The hand may hide one end: a drawer's handle is in its middle.
+    assert part.part.handle is not None
+    middle = float(part.part.handle.origin[1])
+    half = float(np.abs(panel[:, 1] - middle).max())
+    panel[:, 1] = np.clip([middle - half, middle + half], low[1], high[1])
+    panel[1, 0] = float(np.median(seen[:, 0]))
+    return panel
+
+
+def _floor_and_sides(
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    inside: Bool[np.ndarray, "n"],
+    panel: Float[np.ndarray, "2 3"],
+) -> tuple[float, float, float]:
+    """Height of the floor, and where left and right sides are along Y [m]."""
+    low, high = panel
+    level = inside & (normals[:, 2] > _FLAT)
+    level &= (points[:, 1] > low[1] + 0.03) & (points[:, 1] < high[1] - 0.03)
+    level &= points[:, 2] < (low[2] + 2 * high[2]) / 3
+    floor = low[2] + _UNSEEN
+    if level.sum() >= _LEAST:
+        floor = _mode(points[level, 2]) + 0.001
+    walls = inside & (points[:, 2] > floor + 0.015)
+    sides = [low[1] + _UNSEEN, high[1] - _UNSEEN]
+    for end, sign in ((0, 1.0), (1, -1.0)):
+        own = walls & (sign * normals[:, 1] > _FACING)
+        own &= np.abs(points[:, 1] - panel[end, 1]) < 0.12
+        if own.sum() >= _LEAST:
+            sides[end] = _mode(points[own, 1]) + sign * _SIDE_MARGIN
+    return floor, float(sides[0]), float(sides[1])
+
+
+def _mode(values: Float[np.ndarray, "n"]) -> float:
+    """Where most values are [m]."""
+    edges = np.arange(values.min() - _BIN, values.max() + 2 * _BIN, _BIN)
+    counts = np.convolve(np.histogram(values, edges)[0], np.ones(3), mode="same")
+    middle = edges[int(counts.argmax())] + _BIN / 2
+    return float(np.median(values[np.abs(values - middle) < 2 * _BIN]))

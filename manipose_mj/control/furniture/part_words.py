@@ -1,0 +1,118 @@
+"""Which of the parts that were found is meant by words such as `top left drawer`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipose_mj.assets.asset import MovingPart
+from manipose_mj.tasks.articulated.part_choice import kind_of, rows_of
+from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
+
+_OTHER_KIND = 1.5  # what a wrong kind costs, in places
+_LOOKS = 1.0  # and a handle that is where the other kind has it
+_UNSURE = 1.0  # what no confidence costs, in places
+_LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
+_FITS = 1.0  # places off, below which words fit
+_SHARE = 2.0  # how many places the whole height, or width, counts for
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A part that was found. Attributes: part; confidence; beside: how far its handle is from its panel's middle, of
+    half its width."""
+
+    part: MovingPart
+    confidence: float
+    beside: float = 0.5
+
+
+def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
+    """Index of the part that words mean; None where there is none.
+
+    One that would be called so itself, or else the one that comes nearest: a part may have been missed,
+    another may be none.
+
+    Args:
+      words: As of `part_words`.
+      candidates: Of one piece of furniture.
+    """
+    for least in _LEAST:
+        chosen = [i for i, candidate in enumerate(candidates) if candidate.confidence >= least]
+        parts = [candidates[i].part for i in chosen]
+        costs = [
+            _cost(words, parts, candidates[i]) + _UNSURE * (1 - candidates[i].confidence)
+            for i in chosen
+        ]
+        if costs and (min(costs) < _FITS or least == _LEAST[-1]):
+            return chosen[int(np.argmin(costs))]
+    return None
+
+
+def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> float:
+    """How far a part is from what words say, in places."""
+    part = candidate.part
+    noun = "drawer" if "drawer" in words.split() else "door"
+    wrong = (kind_of(part) == "drawer") != (noun == "drawer")
+    alike = [p for p in parts if (kind_of(p) == "drawer") == (noun == "drawer")] or list(parts)
+    if wrong:
+        alike = [*alike, part]
+    elif part_words_among(alike, part) == words:
+        return 0.0
+    rows = rows_of(alike)
+    row = next(i for i, each in enumerate(rows) if any(p is part for p in each))
+    heights = [float(_handle(p)[2]) for p in alike]
+    row_cost = _place_cost(
+        words, ("bottom", "middle", "top"), row, len(rows), float(_handle(part)[2]), heights
+    )
+    beside = sorted(rows[row], key=lambda p: -_from_right(p))
+    column = next(i for i, p in enumerate(beside) if p is part)
+    across = [_from_left(p) for p in alike]
+    column_cost = _place_cost(
+        words, ("left", "middle", "right"), column, len(beside), _from_left(part), across
+    )
+    # What a part is taken for may be wrong; where its handle is says as much.
+    looks = candidate.beside if noun == "drawer" else 1 - candidate.beside
+    return wrong * (_OTHER_KIND + _LOOKS * looks) + row_cost + column_cost
+
+
+def _place_cost(
+    words: str,
+    names: tuple[str, str, str],
+    index: int,
+    count: int,
+    place: float,
+    places: list[float],
+) -> float:
+    """How far a part's place along one direction is from the one that words name."""
+    said = words.split()
+    first, middle, last = names
+    if f"from the {first}" in words:
+        ordinal = next((k for k, name in enumerate(ORDINALS) if name in said), 0)
+        return abs(index - ordinal)
+    named = [name for name in said if name in (first, last)]
+    if not named and middle not in said:
+        return 0.0
+    low, high = min(places), max(places)
+    share = (place - low) / (high - low) if high - low > 0.02 else 0.5
+    if named:
+        return _SHARE * (share if named[0] == first else 1 - share)
+    # The middle of one direction only, where the other has its own word or one place.
+    return _SHARE * abs(index - (count - 1) / 2) / max(count, 1)
+
+
+def _handle(part: MovingPart) -> np.ndarray:
+    assert part.handle is not None
+    return part.handle.origin
+
+
+def _from_left(part: MovingPart) -> float:
+    assert part.handle is not None
+    forwards = -part.handle.rotation[:, 1]
+    return float(part.handle.origin @ np.cross(forwards, np.array([0.0, 0.0, 1.0])))
+
+
+def _from_right(part: MovingPart) -> float:
+    return -_from_left(part)

@@ -1,0 +1,103 @@
+"""What all cameras see of a scene, as one cloud whose points know their instance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dm_control import mjcf
+from dm_control.composer.observation.observable import Observable
+from jaxtyping import Float, Int
+
+from manipose_mj.mjcf.cameras.depth_normals import depth_normals
+from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
+from manipose_mj.poses import transform
+
+
+@dataclass(frozen=True)
+class SceneCloud:
+    """Points of several cameras.
+
+    Attributes:
+      points: `(n, 3)`, world frame [m].
+      normals: `(n, 3)`, unit, towards the camera that saw the point, world frame; zero where not asked for.
+      instance: `(n,)`, as the segmentation has them.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+    instance: Int[np.ndarray, "n"]
+
+    def of(self, instance: int) -> SceneCloud:
+        """The points of one instance."""
+        rows = self.instance == instance
+        return SceneCloud(self.points[rows], self.normals[rows], self.instance[rows])
+
+
+class SceneViews:
+    """Reads depth, segmentation and camera poses of a task's observations, and nothing else."""
+
+    def __init__(self, observables: Mapping[str, Observable], cameras: Sequence[str]) -> None:
+        """Looks at nothing yet.
+
+        Args:
+          observables: Of the task, enabled or not.
+          cameras: Names of those to look through.
+        """
+        self._observables = observables
+        self.cameras = tuple(cameras)
+
+    def camera_pose(self, physics: mjcf.Physics, camera: str) -> Float[np.ndarray, "4 4"]:
+        """`T_world_camera`, OpenCV's axes."""
+        return self._read(physics, f"camera/{camera}/pose")
+
+    def cloud(
+        self,
+        physics: mjcf.Physics,
+        instance: int,
+        *,
+        cameras: Sequence[str] | None = None,
+        normals: bool = True,
+    ) -> SceneCloud:
+        """The measured points of one instance.
+
+        Args:
+          physics: That the sensors measure.
+          instance: As the segmentation has it; 0 is what has no mask of its own.
+          cameras: Through which to look; all by default.
+          normals: Whether they are wanted: they take time.
+        """
+        points, directions = [np.zeros((0, 3))], [np.zeros((0, 3))]
+        for camera in self.cameras if cameras is None else cameras:
+            depth = self._read(physics, f"depth/{camera}")
+            mask = (self._read(physics, f"segmentation/{camera}") == instance) & (depth > 0)
+            pixels = np.argwhere(mask)
+            if not len(pixels):
+                continue
+            pose = self.camera_pose(physics, camera)
+            k = _intrinsics(self._read(physics, f"camera/{camera}/intrinsics"), depth.shape)
+            slopes = (pixels[:, ::-1] - [k.cx, k.cy]) / [k.fx, k.fy]
+            rays = np.concatenate([slopes, np.ones((len(pixels), 1))], axis=1)
+            measured = depth[pixels[:, 0], pixels[:, 1], None].astype(float)
+            points.append(transform(pose, rays * measured))
+            if normals:
+                directions.append(depth_normals(depth, mask, pixels, k) @ pose[:3, :3].T)
+            else:
+                directions.append(np.zeros((len(pixels), 3)))
+        found = np.concatenate(points)
+        return SceneCloud(found, np.concatenate(directions), np.full(len(found), instance))
+
+    def _read(self, physics: mjcf.Physics, key: str) -> np.ndarray:
+        return np.asarray(self._observables[key](physics))
+
+
+def _intrinsics(matrix: Float[np.ndarray, "3 3"], shape: tuple[int, ...]) -> Intrinsics:
+    return Intrinsics(
+        shape[1],
+        shape[0],
+        float(matrix[0, 0]),
+        float(matrix[1, 1]),
+        float(matrix[0, 2]),
+        float(matrix[1, 2]),
+    )

@@ -1,0 +1,67 @@
+"""What the baseline asks of a perception, wherever its knowledge comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+
+
+class Perception(Protocol):
+    """Where a policy's knowledge comes from.
+
+    Attributes:
+      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
+      feels_joints: Whether it corrects joints by what the hand feels.
+      unseen: Objects of goals that nothing has shown yet.
+    """
+
+    sources: Mapping[str, str]
+    feels_joints: bool
+
+    @property
+    def unseen(self) -> frozenset[str]: ...
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm in the scene of the last observation."""
+        ...
+
+    def reset(self, seed: int) -> None:
+        """Start an episode; `seed` is that of everything random."""
+        ...
+
+    def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
+        """Joint angles [rad] and opening [m], cheap enough for every control step."""
+        ...
+
+    def observe(self) -> SceneEstimate:
+        """An estimate of the whole scene as it is now."""
+        ...
+
+    def hold(self, name: str | None) -> None:
+        """The hand holds this from now on; None: it has let go."""
+        ...
+
+    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+        """The hand led a part by its handle along this path of the TCP, world frame [m].
+
+        Args:
+          name: Of the part.
+          path: Of the TCP.
+          stopped: Whether the part went no further.
+        """
+        ...
+
+    def pushed(self, name: str, opening: float) -> None:
+        """The hand pushed a part to about this opening [m or rad]."""
+        ...
+
+    def look_again(self) -> None:
+        """Look at what was opened, and into it; plans made before no longer count."""
+        ...

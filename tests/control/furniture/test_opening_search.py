@@ -1,0 +1,86 @@
+"""How far a part is open, from points of its front."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipose_mj.assets.asset import MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.boxes import no_boxes
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.handle_shape import handle_label
+from manipose_mj.control.furniture.opened_part import seen_open
+from manipose_mj.control.furniture.opening_search import found_opening
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import compose, transform
+
+FRONT = 0.2
+PANEL = np.array([[0.18, -0.2, 0.1], [FRONT, 0.2, 0.25]])
+TURN = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+def plane(low, high, step: float = 0.006) -> np.ndarray:
+    """Noisy points of a box without a third side."""
+    axes = [
+        np.arange(a, b, step) if b - a > 1e-9 else np.array([a])
+        for a, b in zip(low, high, strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return points + np.random.default_rng(0).normal(0, 0.0015, points.shape)
+
+
+def bar() -> np.ndarray:
+    return plane([FRONT + 0.03, -0.06, 0.17], [FRONT + 0.036, 0.06, 0.182], 0.003)
+
+
+def a_part(kind: str) -> PartModel:
+    front = plane([FRONT, -0.2, 0.1], [FRONT, 0.2, 0.25])
+    points = np.concatenate([front, bar()])
+    label, seen = handle_label(points, compose(TURN, np.array([FRONT + 0.03, 0.01, 0.174])), FRONT)
+    assert seen
+    axis, origin = np.array([1.0, 0.0, 0.0]), label.origin
+    if kind == "hinge":
+        axis, origin = np.array([0.0, 0.0, -1.0]), np.array([FRONT, -0.2, 0.17])
+    joint = Joint(kind, origin, axis, (0.0, 0.32 if kind == "slide" else 1.8))
+    return PartModel(
+        MovingPart("it", joint, label, None), PANEL.copy(), no_boxes(), 0.0, 0.9, points
+    )
+
+
+def test_a_bar_is_as_long_and_where_its_points_are():
+    handle = a_part("slide").part.handle
+    assert handle is not None
+    np.testing.assert_allclose(handle.origin, [FRONT + 0.032, 0.0, 0.176], atol=0.004)
+    assert handle.extents[0] == pytest.approx(0.12, abs=0.01)
+
+
+@pytest.mark.parametrize(("kind", "truth", "off", "most"), [
+    ("slide", 0.30, 0.02, 0.004), ("slide", 0.0, 0.05, 0.004), ("hinge", 1.2, 0.3, 0.05)
+])  # fmt: skip
+def test_an_opening_is_found_near_where_the_hand_left_the_part(kind, truth, off, most):
+    part = a_part(kind)
+    points = transform(part.motion(truth), part.looks)
+    assert found_opening(part.at(truth + off), points) == pytest.approx(truth, abs=most)
+
+
+def test_a_drawer_that_is_open_shows_its_floor_and_sides():
+    part, opening = a_part("slide").at(0.25), 0.25
+    floor = plane([FRONT - opening, -0.18, 0.12], [0.18, 0.18, 0.12])
+    side = plane([FRONT - opening, -0.18, 0.12], [0.18, -0.18, 0.22])
+    other = side * [1, -1, 1]
+    front = plane([FRONT, -0.2, 0.1], [FRONT, 0.2, 0.25])
+    ways = ([0, 0, 1], [0, 1, 0], [0, -1, 0], [1, 0, 0])
+    shut = [floor, side, other, front]
+    normals = np.concatenate(
+        [np.tile(way, (len(p), 1)).astype(float) for way, p in zip(ways, shut, strict=True)]
+    )
+    points = np.concatenate(shut) + [opening, 0, 0]
+    model = FurnitureModel(np.eye(4), no_boxes(), (part,), "cabinet")
+    found = seen_open(model, part, SceneCloud(points, normals, np.ones(len(points), int)))
+    assert found.seen_inside and found.part.cavity is not None
+    low = found.part.cavity.center - found.part.cavity.extents / 2
+    high = found.part.cavity.center + found.part.cavity.extents / 2
+    np.testing.assert_allclose(low[1:], [-0.18, 0.12], atol=0.008)
+    assert high[1] == pytest.approx(0.18, abs=0.008)
+    assert low[0] == pytest.approx(FRONT - opening, abs=0.01)

@@ -1,0 +1,62 @@
+"""Words find the part that is meant, among parts of which some are missed or none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipose_mj.assets.asset import MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.furniture.part_words import Candidate, meant_part
+from manipose_mj.poses import SymmetryGroup
+from manipose_mj.tasks.instructions.names import part_words_among
+
+# Across, outwards along x, down.
+TURN = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+def part(name: str, y: float, z: float, kind: str = "slide") -> MovingPart:
+    handle = PoseLabel(
+        np.array([0.3, y, z]),
+        TURN,
+        "handle",
+        np.array([0.1, 0.01, 0.01]),
+        SymmetryGroup(np.eye(3)[None]),
+    )
+    axis = np.array([1.0, 0.0, 0.0]) if kind == "slide" else np.array([0.0, 0.0, 1.0])
+    return MovingPart(name, Joint(kind, handle.origin, axis, (0.0, 0.3)), handle, None)
+
+
+COLUMN = [part(f"drawer_{k}", 0.0, 0.1 + 0.15 * k) for k in range(5)]
+
+
+def found(
+    words: str, parts: list[MovingPart], confidences: list[float] | None = None
+) -> str | None:
+    sure = confidences or [0.7] * len(parts)
+    index = meant_part(words, [Candidate(p, c) for p, c in zip(parts, sure, strict=True)])
+    return None if index is None else parts[index].name
+
+
+def test_every_part_is_found_by_its_own_words():
+    row = [part("left", 0.2, 0.8, "hinge"), part("right", -0.2, 0.8, "hinge")]
+    for each in [*COLUMN, *row]:
+        assert found(part_words_among([*COLUMN, *row], each), [*COLUMN, *row]) == each.name
+
+
+def test_a_part_of_little_confidence_does_not_change_the_order():
+    stray = part("stray", 0.0, 0.95)
+    assert found("top drawer", [*COLUMN[:3], stray], [0.7, 0.7, 0.7, 0.05]) == "drawer_2"
+
+
+def test_what_was_missed_leaves_the_nearest():
+    assert found("middle drawer", [COLUMN[0], COLUMN[2], COLUMN[3], COLUMN[4]]) in (
+        "drawer_2",
+        "drawer_3",
+    )
+    assert found("bottom drawer", COLUMN[1:]) == "drawer_1"
+
+
+def test_a_single_part_that_was_taken_for_another_kind_is_meant_still():
+    assert found("door", [part("only", 0.0, 0.3)]) == "only"
+    assert found("door", []) is None
