@@ -48,7 +48,7 @@ def make(
         `"auto"`, the latter where it is.
       processes: Of the engine `c`.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
-        `objects`, `split`, `randomisation`, `sensors`.
+        `objects`, `split`, `randomisation`, `sensors`, `latency`.
 
     Raises:
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.

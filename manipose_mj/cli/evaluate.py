@@ -6,11 +6,12 @@ import time
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 
 BASELINE = "baseline"
 
@@ -49,6 +50,7 @@ def evaluate(
     ] = None,
     estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
     give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
+    errors: Annotated[InjectedErrors, OmitArgPrefixes] = InjectedErrors(),
 ) -> int:
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
@@ -86,6 +88,7 @@ def evaluate(
         server; by default those of the package's weights.
       estimator_args: Keyword arguments of its factory, as a JSON object.
       give_cad: Give it the mesh of the very object that is seen; the results say so.
+      errors: Made on purpose, to measure what they cost.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
@@ -132,6 +135,7 @@ def evaluate(
         resample=resample,
         planner=planning,
         estimator=chosen_estimator(estimator, estimator_args, give_cad),
+        errors=errors,
     )
     named = check_names(tasks, objects)
     if config.estimator is not None:

@@ -16,6 +16,7 @@ from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
 from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
@@ -72,6 +73,7 @@ class Baseline:
         pose: str = "oracle",
         planner: TaskPlanner | None = None,
         estimator: EstimatorSettings | None = None,
+        errors: PoseErrors = NO_ERRORS,
     ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
@@ -80,11 +82,13 @@ class Baseline:
           pose: Where object poses come from, one of `POSE_SOURCES`.
           planner: Makes the plans; by default by rules.
           estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+          errors: Made to the poses of objects on purpose.
 
         Raises:
           InputError: There is no such source or estimator.
         """
-        self._environment, self._pose, self._estimator = environment, pose, estimator
+        self._environment, self._pose = environment, pose
+        self._estimator, self._errors = estimator, errors
         self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
@@ -109,7 +113,7 @@ class Baseline:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
         arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        perception = make_perception(self._pose, task, physics, self._estimator)
+        perception = make_perception(self._pose, task, physics, self._estimator, self._errors)
         return _Scene(physics.model.ptr, arm, perception)
 
     def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:

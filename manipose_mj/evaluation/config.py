@@ -14,6 +14,7 @@ from manipose_mj.assets.categories import Split
 from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
 
@@ -42,6 +43,7 @@ class EvaluationConfig:
       resample: Base seed for other seeds of the protocol's episodes, whose objects, furniture and parts stay.
       planner: Makes the baseline's plans.
       estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
+      errors: Made on purpose.
     """
 
     tasks: tuple[str, ...]
@@ -57,6 +59,7 @@ class EvaluationConfig:
     resample: int | None = None
     planner: PlannerSettings = PlannerSettings()
     estimator: EstimatorSettings | None = None
+    errors: InjectedErrors = InjectedErrors()
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -76,8 +79,28 @@ class EvaluationConfig:
             raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
         if self.estimator is not None and self.pose != "estimated":
             raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
+        self._check_errors()
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
+
+    def _check_errors(self) -> None:
+        """Refuse errors that nobody would notice."""
+        errors = self.errors
+        if self.policy is None:
+            if errors.of_cameras and self.pose != "estimated":
+                raise InputError(
+                    f"{errors.of_cameras[0]}: with true poses nobody looks; add --pose estimated"
+                )
+            return
+        if errors.assume_upright:
+            raise InputError("--assume-upright is of the baseline; leave it out with a policy")
+        modes = {part.split("/")[0] for part in self.policy.obs_mode.split("+")}
+        if errors.of_poses and "pose" not in modes:
+            raise InputError("--pose-error: the policy sees no poses; --obs-mode names none")
+        if errors.of_cameras and modes.isdisjoint(("rgb", "depth", "segmentation", "pointcloud")):
+            raise InputError(
+                f"{errors.of_cameras[0]}: the policy sees no images; --obs-mode names none"
+            )
 
     def _check_protocol(self, frozen: protocol.Protocol) -> None:
         if self.seed or self.objects is not None:
@@ -90,13 +113,14 @@ class EvaluationConfig:
     @property
     def poses(self) -> dict[str, str]:
         """What of a scene the policy knows truly, by estimates or not at all, for reports."""
+        wrong = f", {self.errors.of_poses}" if self.errors.of_poses else ""
         if self.policy is not None:
             source = "true" if self.policy.sees_true_poses else "none"
-            return {"objects": source, "furniture": source}
+            return {"objects": source + wrong, "furniture": source}
         objects = "estimated" if self.pose == "estimated" else "true"
         if self.estimator is not None:
             objects = self.estimator.source
-        return {"objects": objects, "furniture": "true"}
+        return {"objects": objects + wrong, "furniture": "true"}
 
     @property
     def split(self) -> Split:
@@ -117,14 +141,16 @@ class EvaluationConfig:
                 control_mode=self.policy.control_mode,
                 objects=self.objects,
                 split=self.split,
-                sensors=feature_sensors(self.policy.obs_mode),
+                sensors=self.errors.of_sensors(feature_sensors(self.policy.obs_mode)),
+                latency=self.errors.latency,
             )
         return EnvConfig(
             task,
             obs_mode="state",
             objects=self.objects,
             split=self.split,
-            sensors=sensors_for(self.pose),
+            sensors=self.errors.of_sensors(sensors_for(self.pose)),
+            latency=self.errors.latency,
         )
 
     def episode_seed(self, task: str, episode: int) -> int:
@@ -160,6 +186,7 @@ class EvaluationConfig:
             "policy": self.policy and self.policy.identity,
             "planner": self.planner.identity,
             "estimator": self.estimator and self.estimator.identity,
+            "injected errors": self.errors.identity,
         }
 
     @property
@@ -173,7 +200,7 @@ class EvaluationConfig:
         whose += self.estimator.words if self.estimator is not None else []
         if self.policy is not None:
             whose = self.policy.words
-        words += ["--episodes", str(self.episodes), *chosen, *whose]
+        words += ["--episodes", str(self.episodes), *chosen, *whose, *self.errors.words]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:
             words += ["--objects", *self.objects]

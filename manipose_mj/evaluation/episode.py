@@ -14,6 +14,7 @@ from dm_control import composer
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
+from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
@@ -44,6 +45,7 @@ def run_episode(
     plans: int = MAX_PLANS,
     planner: PlannerSettings = BY_RULES,
     estimator: EstimatorSettings | None = None,
+    errors: PoseErrors = NO_ERRORS,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -57,12 +59,14 @@ def run_episode(
       plans: How many the baseline may try.
       planner: What makes them.
       estimator: Whose estimates they are; None: those of the package's weights.
+      errors: Made to the poses of objects on purpose.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
       ServerLostError: The estimator's server went away.
     """
-    environment, policy = environment_of(config), _baseline(config, pose, plans, planner, estimator)
+    environment = environment_of(config)
+    policy = _baseline(config, pose, plans, planner, estimator, errors)
     naming = Naming(config.task, episode, pose)
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
@@ -312,8 +316,9 @@ def _baseline(
     plans: int,
     planner: PlannerSettings,
     estimator: EstimatorSettings | None,
+    errors: PoseErrors,
 ) -> BaselinePolicy:
     """The baseline of the configuration's environment."""
-    policy = BaselinePolicy(pose, planner.make(), plans, estimator)
+    policy = BaselinePolicy(pose, planner.make(), plans, estimator, errors)
     policy.attach(environment_of(config))
     return policy

@@ -79,7 +79,8 @@ class EstimatedPerception:
         """Compiles nothing yet.
 
         Args:
-          task: Of an environment whose sensors are `SENSORS`, or others with the same cameras.
+          task: Of an environment whose sensors are `SENSORS`, or others; it looks through all of their cameras,
+            through `SPARE_CAMERAS` where it has to.
           physics: The environment's.
           estimators: The estimator of a category; `PoseEstimator.load` by default.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
@@ -89,8 +90,10 @@ class EstimatedPerception:
         self._load = estimators or _load
         self._meshes = meshes
         self._furniture = furniture or TrueFurniture(task, physics)
-        self._views = ObjectViews(task.task_observables, CAMERAS)
-        self._more_views = ObjectViews(task.task_observables, (*CAMERAS, *SPARE_CAMERAS))
+        every = task.env_config.sensors.camera_names
+        usual = tuple(name for name in every if name not in SPARE_CAMERAS) or every
+        self._views = ObjectViews(task.task_observables, usual)
+        self._more_views = ObjectViews(task.task_observables, every)
         self._scenes = EstimatedScenes(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
         self._scene: EstimatedScene | None = None
         self._known: dict[str, SensedPose] = {}

@@ -8,6 +8,7 @@ from dm_control import mjcf
 from manipose_mj.assets.asset import Asset
 from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
+from manipose_mj.control.perception.misled import NO_ERRORS, MisledPerception, PoseErrors
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import unknown_name
@@ -36,6 +37,7 @@ def make_perception(
     task: ManipulationTask,
     physics: mjcf.Physics,
     estimator: EstimatorSettings | None = None,
+    errors: PoseErrors = NO_ERRORS,
 ) -> Perception:
     """The perception of one environment.
 
@@ -44,17 +46,24 @@ def make_perception(
       task: Of the environment.
       physics: Of the environment.
       estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+      errors: Made to the poses of objects on purpose.
 
     Raises:
       InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
+    perception = _perception(pose, task, physics, estimator)
+    return MisledPerception(perception, task, errors) if errors else perception
+
+
+def _perception(
+    pose: str, task: ManipulationTask, physics: mjcf.Physics, estimator: EstimatorSettings | None
+) -> Perception:
     if pose != "estimated":
         return OraclePerception(task, physics)
     if estimator is None:
         return EstimatedPerception(task, physics)
     service = load_estimator(estimator)
-
     return EstimatedPerception(
         task,
         physics,

@@ -179,7 +179,9 @@ def _entry(place: str, record: RunRecord) -> dict[str, Any]:
 
 def _method(run: Mapping[str, Any]) -> dict[str, Any]:
     """Who acted, and what was told truly."""
-    return {name: run.get(name) for name in ("policy", "policy metadata", "pose", "estimator")}
+    method = {name: run.get(name) for name in ("policy", "policy metadata", "pose", "estimator")}
+    wrong = run.get("injected errors")
+    return {**method, "injected errors": wrong} if wrong else method
 
 
 def _inside(place: Any) -> str:

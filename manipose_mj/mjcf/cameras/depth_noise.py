@@ -34,6 +34,7 @@ class StructuredLight:
         sources measured to some 80 deg; the ramp between is our assumption.
       speckle: Share of pixels that fail anywhere; our assumption.
       near, far: Limits of what is measured [m]; near as of PrimeSense's short-range model.
+      noise: Factor of all standard deviations, for sensors better or worse than the sources'.
     """
 
     focal: float = 585.0
@@ -43,6 +44,7 @@ class StructuredLight:
     speckle: float = 0.002
     near: float = 0.35
     far: float = 5.0
+    noise: float = 1.0
 
 
 KINECT = StructuredLight()
@@ -151,11 +153,12 @@ def measure(
     shadow = projector_shadow(depth, intrinsics.fx, sensor.baseline)
     incidence = np.arccos(np.clip(np.where(depth > 0, cosine, 1.0), 0.0, 1.0))
     lit = np.where(shadow, 0.0, depth)
-    rows, columns = _edges_moved(lit, incidence, intrinsics.fx, sensor.focal, rng)
+    source_focal = sensor.focal / sensor.noise
+    rows, columns = _edges_moved(lit, incidence, intrinsics.fx, source_focal, rng)
     depth, incidence = lit[rows, columns], incidence[rows, columns]
     step = sensor.disparity_step * depth**2
     # What the sources measured includes the steps, whose variance is a twelfth of their square.
-    variance = axial_deviation(depth, incidence) ** 2 - step**2 / 12
+    variance = (sensor.noise * axial_deviation(depth, incidence)) ** 2 - step**2 / 12
     noisy = depth + rng.standard_normal(depth.shape) * np.sqrt(np.maximum(variance, 0.0))
     first, last = sensor.grazing
     failing = np.clip((incidence - first) / (last - first), 0.0, 1.0) + sensor.speckle
