@@ -94,9 +94,7 @@ def _rows(arguments: Arguments) -> Iterator[dict[str, Any]]:
                 yield {"task": task, "pose": pose, "error": error, "size": f"{size:g}", **row}
 
 
-def _measured(
-    arguments: Arguments, task: str, pose: str, errors: InjectedErrors
-) -> dict[str, Any]:
+def _measured(arguments: Arguments, task: str, pose: str, errors: InjectedErrors) -> dict[str, Any]:
     """The last columns of a row; a run that is complete is not repeated."""
     name = "-".join([task.replace("/", "__"), pose, *errors.words]).replace("--", "")
     estimator = None

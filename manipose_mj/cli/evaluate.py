@@ -14,6 +14,7 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 
 BASELINE = "baseline"
+NO_ERRORS = InjectedErrors()
 
 
 def evaluate(
@@ -50,7 +51,10 @@ def evaluate(
     ] = None,
     estimator_args: Annotated[str | None, arg(metavar="JSON", help_behavior_hint="")] = None,
     give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
-    errors: Annotated[InjectedErrors, OmitArgPrefixes] = InjectedErrors(),
+    grasps: Annotated[
+        Literal["annotated", "shape", "cloud"] | None, arg(help_behavior_hint="")
+    ] = None,
+    errors: Annotated[InjectedErrors, OmitArgPrefixes] = NO_ERRORS,
 ) -> int:
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
@@ -88,6 +92,8 @@ def evaluate(
         server; by default those of the package's weights.
       estimator_args: Keyword arguments of its factory, as a JSON object.
       give_cad: Give it the mesh of the very object that is seen; the results say so.
+      grasps: Where the baseline's grasps come from: the object's own, the shape that was fitted to its cloud, or the
+        cloud; by default annotated with true poses and shape with estimated ones.
       errors: Made on purpose, to measure what they cost.
     """
     one_thread_per_process()
@@ -136,6 +142,7 @@ def evaluate(
         planner=planning,
         estimator=chosen_estimator(estimator, estimator_args, give_cad),
         errors=errors,
+        grasps=grasps,
     )
     named = check_names(tasks, objects)
     if config.estimator is not None:

@@ -18,6 +18,7 @@ from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
 from manipose_mj.control.perception.pose_sources import make_perception
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
 from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
@@ -74,6 +75,7 @@ class Baseline:
         planner: TaskPlanner | None = None,
         estimator: EstimatorSettings | None = None,
         errors: PoseErrors = NO_ERRORS,
+        grasps: GraspSource | None = None,
     ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
@@ -83,12 +85,14 @@ class Baseline:
           planner: Makes the plans; by default by rules.
           estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
           errors: Made to the poses of objects on purpose.
+          grasps: Where those of objects come from; by default what suits `pose`.
 
         Raises:
           InputError: There is no such source or estimator.
         """
         self._environment, self._pose = environment, pose
         self._estimator, self._errors = estimator, errors
+        self._grasps: GraspSource | None = grasps
         self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
@@ -113,7 +117,9 @@ class Baseline:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
         arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
-        perception = make_perception(self._pose, task, physics, self._estimator, self._errors)
+        perception = make_perception(
+            self._pose, task, physics, self._estimator, self._errors, self._grasps
+        )
         return _Scene(physics.model.ptr, arm, perception)
 
     def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:

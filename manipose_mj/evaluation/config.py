@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from manipose_mj.assets.categories import Split
-from manipose_mj.errors import InputError
+from manipose_mj.control.perception.source_names import (
+    DEFAULT_GRASPS,
+    GRASP_SOURCES,
+    GraspSource,
+)
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.injected_errors import InjectedErrors
@@ -44,6 +49,7 @@ class EvaluationConfig:
       planner: Makes the baseline's plans.
       estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
       errors: Made on purpose.
+      grasps: Where the baseline's grasps of objects come from; None: as suits `pose`.
     """
 
     tasks: tuple[str, ...]
@@ -60,6 +66,7 @@ class EvaluationConfig:
     planner: PlannerSettings = PlannerSettings()
     estimator: EstimatorSettings | None = None
     errors: InjectedErrors = InjectedErrors()
+    grasps: GraspSource | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -80,6 +87,7 @@ class EvaluationConfig:
         if self.estimator is not None and self.pose != "estimated":
             raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         self._check_errors()
+        self._check_grasps()
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
 
@@ -101,6 +109,23 @@ class EvaluationConfig:
             raise InputError(
                 f"{errors.of_cameras[0]}: the policy sees no images; --obs-mode names none"
             )
+
+    def _check_grasps(self) -> None:
+        if self.grasps is None:
+            return
+        if self.grasps not in GRASP_SOURCES:
+            raise unknown_name("source of grasps", self.grasps, GRASP_SOURCES)
+        if self.policy is not None:
+            raise InputError("--grasps is of the baseline; leave it out with a policy")
+        if self.grasps != "annotated" and self.pose != "estimated":
+            raise InputError(
+                f"--grasps {self.grasps} needs --pose estimated: with true poses nobody looks"
+            )
+
+    @property
+    def grasp_source(self) -> str | None:
+        """Where the baseline's grasps come from; None for a policy."""
+        return None if self.policy is not None else self.grasps or DEFAULT_GRASPS.get(self.pose)
 
     def _check_protocol(self, frozen: protocol.Protocol) -> None:
         if self.seed or self.objects is not None:
@@ -187,6 +212,7 @@ class EvaluationConfig:
             "planner": self.planner.identity,
             "estimator": self.estimator and self.estimator.identity,
             "injected errors": self.errors.identity,
+            "grasps": self.grasps,
         }
 
     @property
@@ -200,6 +226,7 @@ class EvaluationConfig:
         whose += self.estimator.words if self.estimator is not None else []
         if self.policy is not None:
             whose = self.policy.words
+        whose += [] if self.grasps is None else ["--grasps", self.grasps]
         words += ["--episodes", str(self.episodes), *chosen, *whose, *self.errors.words]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:

@@ -15,6 +15,7 @@ from dm_control import composer
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
 from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
@@ -46,6 +47,7 @@ def run_episode(
     planner: PlannerSettings = BY_RULES,
     estimator: EstimatorSettings | None = None,
     errors: PoseErrors = NO_ERRORS,
+    grasps: GraspSource | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -60,13 +62,14 @@ def run_episode(
       planner: What makes them.
       estimator: Whose estimates they are; None: those of the package's weights.
       errors: Made to the poses of objects on purpose.
+      grasps: Where those of objects come from; by default what suits `pose`.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
       ServerLostError: The estimator's server went away.
     """
     environment = environment_of(config)
-    policy = _baseline(config, pose, plans, planner, estimator, errors)
+    policy = _baseline(config, pose, plans, planner, estimator, errors, grasps)
     naming = Naming(config.task, episode, pose)
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
@@ -317,8 +320,9 @@ def _baseline(
     planner: PlannerSettings,
     estimator: EstimatorSettings | None,
     errors: PoseErrors,
+    grasps: GraspSource | None,
 ) -> BaselinePolicy:
     """The baseline of the configuration's environment."""
-    policy = BaselinePolicy(pose, planner.make(), plans, estimator, errors)
+    policy = BaselinePolicy(pose, planner.make(), plans, estimator, errors, grasps)
     policy.attach(environment_of(config))
     return policy

@@ -15,6 +15,7 @@ from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -64,6 +65,7 @@ class BaselineRunner:
     planner: PlannerSettings
     estimator: EstimatorSettings | None = None
     errors: InjectedErrors = InjectedErrors()
+    grasps: GraspSource | None = None
 
     def __call__(
         self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
@@ -80,6 +82,7 @@ class BaselineRunner:
                 planner=self.planner,
                 estimator=self.estimator,
                 errors=self.errors.pose_errors(),
+                grasps=self.grasps,
             )
 
 
@@ -145,7 +148,7 @@ def evaluate(
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
-        runner = BaselineRunner(config.planner, config.estimator, config.errors)
+        runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), _results_file(config.out) as file:
@@ -373,6 +376,7 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
     settings["split"] = config.split
     settings["pose"] = _pose_source(config)
     settings["poses"] = config.poses
+    settings["grasps"] = config.grasp_source
     return {
         "tasks": summarize(results),
         "versions": versions(),

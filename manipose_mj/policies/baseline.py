@@ -11,6 +11,7 @@ from dm_control import composer
 from manipose_mj.control.baseline import MAX_PLANS, Baseline
 from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
 from manipose_mj.control.perception.pose_sources import check_pose_source
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.planner import TaskPlanner
 from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -33,6 +34,7 @@ class BaselinePolicy:
         plans: int = MAX_PLANS,
         estimator: EstimatorSettings | None = None,
         errors: PoseErrors = NO_ERRORS,
+        grasps: GraspSource | None = None,
     ) -> None:
         """Acts in no environment yet.
 
@@ -42,6 +44,7 @@ class BaselinePolicy:
           plans: How many it may try.
           estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
           errors: Made to the poses of objects on purpose.
+          grasps: Where those of objects come from; by default what suits `pose`.
 
         Raises:
           InputError: There is no such source of poses.
@@ -50,6 +53,7 @@ class BaselinePolicy:
         self.pose_source = pose
         self._planner, self._plans = planner, plans
         self._estimator, self._errors = estimator, errors
+        self._grasps: GraspSource | None = grasps
         self._environment: composer.Environment | None = None
         self._baseline: Baseline | None = None
         self._actions: Iterator[np.ndarray] = iter(())
@@ -70,7 +74,12 @@ class BaselinePolicy:
         if environment is not self._environment:
             self._environment = environment
             self._baseline = Baseline(
-                environment, self.pose_source, self._planner, self._estimator, self._errors
+                environment,
+                self.pose_source,
+                self._planner,
+                self._estimator,
+                self._errors,
+                self._grasps,
             )
         self.baseline.status = ""  # the generator of actions resets it too late for a first record
 

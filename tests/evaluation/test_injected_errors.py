@@ -96,3 +96,26 @@ def test_sizes_are_finite_and_not_negative(value):
 def test_a_card_says_which_errors_were_made():
     method = {"policy": None, "pose": "oracle", "injected errors": {"pose_error_cm": 2.0}}
     assert method_text(method).endswith("; errors made on purpose: pose error cm 2.0")
+
+
+def test_results_say_where_grasps_come_from(tmp_path):
+    made = config(tmp_path, InjectedErrors(), grasps="cloud")
+    evaluate(made, runner=fake.make_runner())
+    run, summary = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("run", "summary"))
+    assert run["grasps"] == summary["grasps"] == "cloud" and "--grasps cloud" in run["command"]
+    plain = config(tmp_path, InjectedErrors(), pose="oracle")
+    assert plain.identity["grasps"] is None and plain.grasp_source == "annotated"
+    assert ", grasps by cloud" in method_text({"pose": "estimated", "grasps": "cloud"})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"grasps": "clouds"}, "did you mean cloud"),
+        ({"grasps": "cloud", "pose": "oracle"}, "needs --pose estimated"),
+        ({"grasps": "annotated", "pose": "oracle", "policy": POLICY}, "of the baseline"),
+    ],
+)
+def test_grasps_of_another_source_are_refused(tmp_path, changes, said):
+    with pytest.raises(InputError, match=said):
+        config(tmp_path, InjectedErrors(), **changes)

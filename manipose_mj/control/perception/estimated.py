@@ -18,6 +18,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.perception.estimated_scene import EstimatedScene, EstimatedScenes
 from manipose_mj.control.perception.furniture_perception import FurniturePerception, TrueFurniture
+from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.known_shapes import KnownShape, known_shapes
 from manipose_mj.control.perception.object_views import ObjectView, ObjectViews
 from manipose_mj.control.perception.pose_sensing import (
@@ -27,6 +28,7 @@ from manipose_mj.control.perception.pose_sensing import (
     seen_points,
     sense_pose,
 )
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
@@ -75,6 +77,7 @@ class EstimatedPerception:
         estimators: Callable[[str], Estimator] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
         furniture: FurniturePerception | None = None,
+        grasps: GraspSource = "shape",
     ) -> None:
         """Compiles nothing yet.
 
@@ -85,11 +88,13 @@ class EstimatedPerception:
           estimators: The estimator of a category; `PoseEstimator.load` by default.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
           furniture: Where drawers and doors are; the simulator by default.
+          grasps: Where grasps come from.
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
         self._meshes = meshes
         self._furniture = furniture or TrueFurniture(task, physics)
+        self._grasp_source: GraspSource = grasps
         every = task.env_config.sensors.camera_names
         usual = tuple(name for name in every if name not in SPARE_CAMERAS) or every
         self._views = ObjectViews(task.task_observables, usual)
@@ -104,6 +109,7 @@ class EstimatedPerception:
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
             "furniture": self._furniture.source,
+            "grasps": grasps,
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
 
@@ -128,7 +134,7 @@ class EstimatedPerception:
             elif name in needed:
                 raise StageFailure("perception", f"no camera sees enough of {name}")
         self._time = float(self._physics.data.time)
-        self._grasps = {name: sensed.shape.sampled_grasps() for name, sensed in self._known.items()}
+        self._grasps = {name: self._grasps_of(name) for name in self._known}
         self._scene = self._scenes.build(
             {name: sensed.shape.hulls for name, sensed in self._known.items()}
         )
@@ -206,6 +212,23 @@ class EstimatedPerception:
         views = self._more_views.of(self._physics, name)
         return sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
 
+    def _grasps_of(self, name: str) -> GraspSet:
+        """For the pose estimated and those that goals ask for."""
+        symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
+        frames = [goal.goal_frame(symmetries) for goal in self._task.goals]
+        rotations = [
+            np.asarray(frame.pose)[:3, :3]
+            for frame in frames
+            if frame is not None and frame.object == name and frame.rotation_counts
+        ]
+        return sensed_grasps(
+            self._grasp_source,
+            self._known[name],
+            self._views.of(self._physics, name) or self._more_views.of(self._physics, name),
+            rotations,
+            lambda: self._task.objects[name].asset,
+        )
+
     def _with_mesh(self, name: str, views: tuple[ObjectView, ...]) -> tuple[ObjectView, ...]:
         """The views as estimators get them: with the object's mesh, if they are given it."""
         if self._meshes is None:
@@ -225,6 +248,7 @@ class EstimatedPerception:
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
             category=self._categories()[name],
+            uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
         )
 
 

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import StablePose

@@ -10,6 +10,7 @@ from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerceptio
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.misled import NO_ERRORS, MisledPerception, PoseErrors
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.perception.source_names import DEFAULT_GRASPS, GraspSource
 from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
@@ -38,6 +39,7 @@ def make_perception(
     physics: mjcf.Physics,
     estimator: EstimatorSettings | None = None,
     errors: PoseErrors = NO_ERRORS,
+    grasps: GraspSource | None = None,
 ) -> Perception:
     """The perception of one environment.
 
@@ -47,28 +49,34 @@ def make_perception(
       physics: Of the environment.
       estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
       errors: Made to the poses of objects on purpose.
+      grasps: Where grasps come from; None: those annotated with true poses, sampled on the fitted shape else.
 
     Raises:
       InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
-    perception = _perception(pose, task, physics, estimator)
+    perception = _perception(pose, task, physics, estimator, grasps or DEFAULT_GRASPS[pose])
     return MisledPerception(perception, task, errors) if errors else perception
 
 
 def _perception(
-    pose: str, task: ManipulationTask, physics: mjcf.Physics, estimator: EstimatorSettings | None
+    pose: str,
+    task: ManipulationTask,
+    physics: mjcf.Physics,
+    estimator: EstimatorSettings | None,
+    grasps: GraspSource,
 ) -> Perception:
     if pose != "estimated":
         return OraclePerception(task, physics)
     if estimator is None:
-        return EstimatedPerception(task, physics)
+        return EstimatedPerception(task, physics, grasps=grasps)
     service = load_estimator(estimator)
     return EstimatedPerception(
         task,
         physics,
         estimators=lambda category: ForeignEstimator(service, category),
         meshes=_mesh_of if estimator.give_cad else None,
+        grasps=grasps,
     )
 
 

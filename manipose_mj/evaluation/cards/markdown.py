@@ -27,7 +27,8 @@ def method_text(method: Mapping[str, Any]) -> str:
     """Who acted, what was told truly and what was made wrong on purpose, in a line."""
     wrong = method.get("injected errors") or {}
     made = [f"{name.replace('_', ' ')} {value}" for name, value in wrong.items()]
-    return _who(method) + (f"; errors made on purpose: {', '.join(made)}" if made else "")
+    grasps = f", grasps by {method['grasps']}" if method.get("grasps") else ""
+    return _who(method) + grasps + (f"; errors made on purpose: {', '.join(made)}" if made else "")
 
 
 def _who(method: Mapping[str, Any]) -> str:

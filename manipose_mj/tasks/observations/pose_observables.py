@@ -63,7 +63,7 @@ class PoseObservables:
         slots: Slots,
         cameras: Sequence[str],
         noise: PoseNoise,
-        error: FixedError = FixedError(),
+        error: FixedError,
     ) -> None:
         """Lays out the names.
 

@@ -44,9 +44,7 @@ def test_observed_poses_are_off_by_the_same_in_every_step_and_starts_are_the_sam
     seen = [first, wrong.step(hold(wrong))]
     obj = wrong.task.object
     true = obj.label_pose(wrong.physics)
-    shift, turn = pose_error(
-        seen[-1].observation["pose/object"], true, obj.asset.label.symmetry
-    )
+    shift, turn = pose_error(seen[-1].observation["pose/object"], true, obj.asset.label.symmetry)
     assert (float(shift), float(turn)) == pytest.approx((0.02, 0.2))
     errors = [invert(true) @ step.observation["pose/object"] for step in seen]
     np.testing.assert_allclose(errors[0], errors[1], atol=1e-3)  # it has hardly moved
@@ -69,9 +67,7 @@ def test_a_wrong_calibration_moves_clouds_and_leaves_images():
     own = slice(0, 200)
     moved = transform(stated @ invert(plain["camera/left/pose"]), plain["pointcloud/points"][own])
     np.testing.assert_allclose(seen["pointcloud/points"][own], moved, atol=1e-5)
-    np.testing.assert_array_equal(
-        seen["pointcloud/colours"][own], plain["pointcloud/colours"][own]
-    )
+    np.testing.assert_array_equal(seen["pointcloud/colours"][own], plain["pointcloud/colours"][own])
 
 
 def test_depth_noise_grows_with_its_factor():
