@@ -42,7 +42,7 @@ def draw_strips(records: Sequence[RunRecord], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     wanted = set()
     for record in records:
-        poses = "estimated" if record.run.get("pose") == "estimated" else "true"
+        poses = "true" if record.run.get("pose") == "oracle" else "estimated"
         for result in record.results:
             if result.failure is None:
                 continue

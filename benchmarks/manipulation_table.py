@@ -118,7 +118,7 @@ def main(arguments: Arguments) -> None:
 def episodes_of(record: RunRecord) -> list[Played]:
     """The episodes of a run."""
     run = record.run
-    poses = "estimated" if run.get("pose") == "estimated" else "true"
+    poses = "true" if run.get("pose") == "oracle" else "estimated"
     planner = (run.get("planner") or {}).get("kind", "rules")
     grasps = run.get("grasps") or ("annotated" if poses == "true" else "fitted shape")
     return [Played(result, poses, grasps, planner) for result in record.results]

@@ -12,9 +12,9 @@ import numpy as np
 
 from manipose_mj.assets.categories import Split
 from manipose_mj.control.perception.source_names import (
-    DEFAULT_GRASPS,
     GRASP_SOURCES,
     GraspSource,
+    default_grasps,
 )
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -95,7 +95,7 @@ class EvaluationConfig:
         """Refuse errors that nobody would notice."""
         errors = self.errors
         if self.policy is None:
-            if errors.of_cameras and self.pose != "estimated":
+            if errors.of_cameras and self.pose == "oracle":
                 raise InputError(
                     f"{errors.of_cameras[0]}: with true poses nobody looks; add --pose estimated"
                 )
@@ -117,7 +117,7 @@ class EvaluationConfig:
             raise unknown_name("source of grasps", self.grasps, GRASP_SOURCES)
         if self.policy is not None:
             raise InputError("--grasps is of the baseline; leave it out with a policy")
-        if self.grasps != "annotated" and self.pose != "estimated":
+        if self.grasps != "annotated" and self.pose == "oracle":
             raise InputError(
                 f"--grasps {self.grasps} needs --pose estimated: with true poses nobody looks"
             )
@@ -125,7 +125,7 @@ class EvaluationConfig:
     @property
     def grasp_source(self) -> str | None:
         """Where the baseline's grasps come from; None for a policy."""
-        return None if self.policy is not None else self.grasps or DEFAULT_GRASPS.get(self.pose)
+        return None if self.policy is not None else self.grasps or default_grasps(self.pose)
 
     def _check_protocol(self, frozen: protocol.Protocol) -> None:
         if self.seed or self.objects is not None:

@@ -10,7 +10,7 @@ from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerceptio
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.misled import NO_ERRORS, MisledPerception, PoseErrors
 from manipose_mj.control.perception.oracle import OraclePerception
-from manipose_mj.control.perception.source_names import DEFAULT_GRASPS, GraspSource
+from manipose_mj.control.perception.source_names import GraspSource, default_grasps
 from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
@@ -55,7 +55,7 @@ def make_perception(
       InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
-    perception = _perception(pose, task, physics, estimator, grasps or DEFAULT_GRASPS[pose])
+    perception = _perception(pose, task, physics, estimator, grasps or default_grasps(pose))
     return MisledPerception(perception, task, errors) if errors else perception
 
 

@@ -6,5 +6,8 @@ from typing import Literal, get_args
 
 GraspSource = Literal["annotated", "shape", "cloud"]
 GRASP_SOURCES: tuple[GraspSource, ...] = get_args(GraspSource)
-# By the source of poses.
-DEFAULT_GRASPS: dict[str, GraspSource] = {"oracle": "annotated", "estimated": "shape"}
+
+
+def default_grasps(pose: str) -> GraspSource:
+    """What suits a source of poses: what is estimated has no annotations."""
+    return "annotated" if pose == "oracle" else "shape"
