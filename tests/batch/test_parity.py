@@ -42,7 +42,7 @@ def test_a_world_is_the_episode_of_its_seed_bit_for_bit(task):
             assert bool(state.success[world]) is environment.task.success_now
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("mode", CONTROL_MODES)
 def test_control_modes_are_those_of_the_task(mode):
     task = "single_object/target_pose"

@@ -17,11 +17,6 @@ OWN_TASKS = (
     ROOT / "docs" / "guides" / "own_tasks.md"
 )  # tests/conformance runs it at every front door
 RUN = [page for page in WITH_CODE if page != OWN_TASKS]
-# The README in the quick tier; guides take longer.
-CASES = [
-    pytest.param(page, id=name(page), marks=() if page == ROOT / "README.md" else pytest.mark.full)
-    for page in RUN
-]
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=name)
@@ -30,7 +25,8 @@ def test_python_blocks_compile(page):
         compile("\n" * (block.line - 1) + block.code, str(page), "exec")
 
 
-@pytest.mark.parametrize("page", CASES)
+@pytest.mark.full
+@pytest.mark.parametrize("page", RUN, ids=name)
 def test_python_blocks_run(page, tmp_path):
     """In a process of their own: they register tasks, which other tests must not see."""
     code = "\n".join(block.code for block in blocks(page, "python"))

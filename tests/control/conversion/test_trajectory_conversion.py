@@ -86,7 +86,7 @@ def test_every_mode_goes_where_the_recording_went(cans, reach, mode):
     np.testing.assert_allclose(cans.task.robot.tcp_pose(cans.physics)[:3, 3], end, atol=END)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["pd_joint_vel", "pd_ee_delta_pos", "pd_ee_target_delta_pos"])
 def test_a_carry_is_one_in_modes_far_from_its_own(cans, transport, mode):
     assert convert(cans, transport, mode).success

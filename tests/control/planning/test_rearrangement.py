@@ -126,7 +126,7 @@ def test_a_motion_that_does_not_touch_the_pile_ignores_its_own_contacts(stacked)
     assert any(upwards > 0.3 for _, upwards in touching)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(("task", "seed"), [("pick", 2), ("multi", 3), ("stacked", 24)])
 def test_the_baseline_succeeds(task, seed):
     result, _ = episode.run_episode(config(f"clutter/{task}", obs_mode="state"), EpisodeSpec(seed))

@@ -88,6 +88,7 @@ def test_a_shipped_certificate_solves_its_start(start):
     assert list(verify("v1", SHIPPED, [start], jobs=1)) == [(start, SHIPPED.solved[start])]
 
 
+@pytest.mark.full
 def test_commands_find_and_replay(tmp_path, capsys):
     out = str(tmp_path / "c.json")
     chosen = ["--tasks", TASK, "--episodes", "1", "--jobs", "1"]

@@ -73,6 +73,7 @@ def test_true_votes_give_the_true_parts(sample, seed):
     assert float(jnp.abs(targets["turn"]).max()) * TURN < 0.3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("across", "parts"), [(False, 1), (True, 2)])
 def test_votes_spread_along_a_handle_are_one_part_and_across_it_two(sample, across, parts):
     """Half of a handle's points say 3 cm this way, half that way."""

@@ -60,6 +60,7 @@ def test_normals_do_not_tell_the_side_that_is_seen(mugs):
     assert jnp.array_equal(unoriented(-axes), jnp.diag(jnp.array([1.0, -1.0, 1.0])))
 
 
+@pytest.mark.full
 def test_votes_that_know_the_truth_give_it_back(mugs, config):
     """The centre to a cell or two, each axis to the spacing of the directions."""
     cloud = mugs[0]

@@ -31,7 +31,7 @@ KEPT = 4
 CUP, SAUSAGE, MUG = CommonSymmetry(True), CommonSymmetry(True, True), CommonSymmetry()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("symmetry", "ambiguous", "kept"), [(MUG, 9, KEPT), (CUP, 1, 1), (SAUSAGE, 0, 0)]
 )

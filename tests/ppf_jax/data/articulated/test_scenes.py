@@ -58,6 +58,7 @@ def test_fused_views_agree(scene):
         assert not len(own) or np.linalg.norm(own - poses[i, :3, 3], axis=1).max() < reach
 
 
+@pytest.mark.full
 def test_batches_are_the_same_whoever_makes_them(tmp_path, monkeypatch):
     monkeypatch.setenv("MANIPOSE_CACHE", str(tmp_path))
     objects = [("microwave", 0)]
