@@ -18,6 +18,10 @@ from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.grasp_sampling.grasp_choice import clear_of_plane
 from manipose_mj.poses import invert, transform
 
+_COMMON = (
+    3  # rest poses, the most probable, that an object may be set down in where no goal says how
+)
+
 
 def sensed_grasps(
     source: GraspSource,
@@ -47,6 +51,8 @@ def sensed_grasps(
         transform(to_label, seen_points(views)), normals @ to_label[:3, :3].T, shape
     )
     held_in = [resting(shape, rotation) for rotation in (sensed.pose[:3, :3], *rotations)]
+    if not rotations:  # it may be set down on any side
+        held_in += shape.rests[:_COMMON]
     return cloud_grasps(cloud, held_in, shape.rests)
 
 

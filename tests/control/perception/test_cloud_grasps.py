@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from manipose_mj.assets.asset import StablePose
+from manipose_mj.assets.asset import GraspSet, StablePose
 from manipose_mj.assets.geometry import MassProperties
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.perception.cloud_grasps import cloud_grasps
-from manipose_mj.control.perception.grasp_sources import resting
+from manipose_mj.control.perception.grasp_sources import resting, sensed_grasps
 from manipose_mj.control.perception.known_shapes import KnownShape
+from manipose_mj.control.perception.object_views import ObjectView
 from manipose_mj.control.perception.observed_surface import completed, observed_surface
+from manipose_mj.control.perception.pose_sensing import SensedPose
+from manipose_mj.control.perception.source_names import GRASP_SOURCES
 from manipose_mj.poses import SymmetryGroup, rotation_about
 
 X = np.array([1.0, 0.0, 0.0])
@@ -77,6 +84,7 @@ def test_what_the_fitted_shape_lacks_is_in_the_way():
     assert np.linalg.norm(cloud.obstacles - clip, axis=1).min() < 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.2])
 def test_a_bar_is_taken_from_above_however_it_lies(angle):
     shape = prism(0.02, 0.02, rounded=True)  # its label knows no turn about X
@@ -91,3 +99,23 @@ def test_a_bar_is_taken_from_above_however_it_lies(angle):
     assert ((down > 0.99).sum(axis=0) >= 10).all(), "few from above"
     assert (down.min(axis=1) > 0.75).sum() >= 5, "none serves both"
     assert len(grasps) <= 200 and (grasps.widths < 0.03).all()
+
+
+def view(points: np.ndarray, normals: np.ndarray) -> ObjectView:
+    nothing: Any = None
+    pose = np.eye(4)
+    return ObjectView("front", pose, points.astype(np.float32), normals.astype(np.float32), nothing)
+
+
+def test_every_source_gives_grasps_for_the_rests_of_the_fitted_shape():
+    shape = prism(0.02, 0.02, rounded=True)
+    sensed = SensedPose(np.eye(4), shape, 0.001, 0.95, "front")
+    views = (view(*seen_bar(0.022, np.random.default_rng(0))),)
+    own = GraspSet(np.tile(np.eye(4), (3, 1, 1)), np.full(3, 0.02), np.ones((3, 5), bool))
+    label = replace(shape.label, origin=np.array([0.0, 0.0, 0.1]))
+    asset: Any = SimpleNamespace(grasps=own, label=label)
+    for source in GRASP_SOURCES:
+        grasps = sensed_grasps(source, sensed, views, (), lambda: asset)
+        assert len(grasps) and grasps.clear.shape == (len(grasps), 2), source
+        if source == "annotated":
+            np.testing.assert_allclose(grasps.poses[:, 2, 3], -0.1)
