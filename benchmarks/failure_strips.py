@@ -8,13 +8,15 @@ from __future__ import annotations
 import io
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 from PIL import Image
 
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.evaluation.cards.run_record import RunRecord
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.episode import scene_model
@@ -30,6 +32,11 @@ from manipose_mj.mjcf.views.film import film_strip
 
 PICTURES, HEIGHT, WIDTH = 5, 150, 200
 CAMERA = "overview"
+
+
+def grasps_of(run: Mapping[str, Any]) -> GraspSource:
+    """Where a run's grasps came from; older runs do not say so."""
+    return run.get("grasps") or ("annotated" if run.get("pose") == "oracle" else "shape")
 
 
 def strip_name(result: EpisodeResult, poses: str) -> str:
@@ -70,8 +77,10 @@ def _strip(record: RunRecord, result: EpisodeResult) -> bytes:
             episodes=result.episode + 1,
             pose=run["pose"],
             protocol=run["protocol"],
+            grasps=grasps_of(run),
         )
-        again = run_one(config, BaselineRunner(config.planner), result.task, result.episode)
+        runner = BaselineRunner(config.planner, grasps=config.grasps)
+        again = run_one(config, runner, result.task, result.episode)
         if (again.failure, again.reason) != (result.failure, result.reason):
             raise RuntimeError(
                 f"{result.task}, episode {result.episode}: {result.failure}, {result.reason}; "

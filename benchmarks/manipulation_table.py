@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from failure_strips import draw_strips, strip_name
+from failure_strips import draw_strips, grasps_of, strip_name
 from tyro.conf import Positional
 
 from manipose_mj.assets import categories
@@ -120,8 +120,7 @@ def episodes_of(record: RunRecord) -> list[Played]:
     run = record.run
     poses = "true" if run.get("pose") == "oracle" else "estimated"
     planner = (run.get("planner") or {}).get("kind", "rules")
-    grasps = run.get("grasps") or ("annotated" if poses == "true" else "fitted shape")
-    return [Played(result, poses, grasps, planner) for result in record.results]
+    return [Played(result, poses, grasps_of(run), planner) for result in record.results]
 
 
 def tables(episodes: Sequence[Played]) -> str:

@@ -49,7 +49,7 @@ COLUMNS = ("task", "pose", "error", "size", "successes", "episodes", "low", "hig
 @dataclass(frozen=True)
 class Arguments:
     """Attributes: runs: folder for the evaluations; out: the table; tasks; errors: names of `SIZES`; episodes of each
-    size; jobs; estimator: whose estimates are measured, the package's by default."""
+    size; jobs; sizes: instead of those of `SIZES`; estimator: whose estimates are measured, the package's by default."""
 
     runs: Path
     out: Path
@@ -57,6 +57,7 @@ class Arguments:
     errors: tuple[str, ...] = tuple(SIZES)
     episodes: int = 10
     jobs: int = 1
+    sizes: tuple[float, ...] = ()
     estimator: str | None = None
 
     def __post_init__(self) -> None:
@@ -88,7 +89,7 @@ def _rows(arguments: Arguments) -> Iterator[dict[str, Any]]:
     for task in arguments.tasks:
         for error in arguments.errors:
             pose, sizes = SIZES[error]
-            for size in sorted({USUAL.get(error, 0.0), *sizes}):
+            for size in sorted({USUAL.get(error, 0.0), *(arguments.sizes or sizes)}):
                 made = injected(error, size)
                 row = _measured(arguments, task, pose, made)
                 yield {"task": task, "pose": pose, "error": error, "size": f"{size:g}", **row}

@@ -93,7 +93,7 @@ def evaluate(
       estimator_args: Keyword arguments of its factory, as a JSON object.
       give_cad: Give it the mesh of the very object that is seen; the results say so.
       grasps: Where the baseline's grasps come from: the object's own, the shape that was fitted to its cloud, or the
-        cloud; by default annotated with true poses and shape with estimated ones.
+        cloud; by default annotated with true poses and cloud with estimated ones.
       errors: Made on purpose, to measure what they cost.
     """
     one_thread_per_process()

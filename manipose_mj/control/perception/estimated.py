@@ -77,7 +77,7 @@ class EstimatedPerception:
         estimators: Callable[[str], Estimator] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
         furniture: FurniturePerception | None = None,
-        grasps: GraspSource = "shape",
+        grasps: GraspSource = "cloud",
     ) -> None:
         """Compiles nothing yet.
 
@@ -109,7 +109,6 @@ class EstimatedPerception:
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
             "furniture": self._furniture.source,
-            "grasps": grasps,
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
 

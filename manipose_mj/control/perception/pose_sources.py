@@ -49,7 +49,7 @@ def make_perception(
       physics: Of the environment.
       estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
       errors: Made to the poses of objects on purpose.
-      grasps: Where grasps come from; None: those annotated with true poses, sampled on the fitted shape else.
+      grasps: Where grasps come from; None: those annotated with true poses, else from clouds.
 
     Raises:
       InputError: There is no such source or estimator.

@@ -10,4 +10,4 @@ GRASP_SOURCES: tuple[GraspSource, ...] = get_args(GraspSource)
 
 def default_grasps(pose: str) -> GraspSource:
     """What suits a source of poses: what is estimated has no annotations."""
-    return "annotated" if pose == "oracle" else "shape"
+    return "annotated" if pose == "oracle" else "cloud"
