@@ -16,7 +16,7 @@ from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.check import check_plan
@@ -74,7 +74,7 @@ class Baseline:
         pose: str = "oracle",
         planner: TaskPlanner | None = None,
         estimator: EstimatorSettings | None = None,
-        errors: PoseErrors = NO_ERRORS,
+        errors: PosePerturbation = UNPERTURBED,
         grasps: GraspSource | None = None,
     ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.

@@ -14,7 +14,7 @@ from dm_control import composer
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
-from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -46,7 +46,7 @@ def run_episode(
     plans: int = MAX_PLANS,
     planner: PlannerSettings = BY_RULES,
     estimator: EstimatorSettings | None = None,
-    errors: PoseErrors = NO_ERRORS,
+    errors: PosePerturbation = UNPERTURBED,
     grasps: GraspSource | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
@@ -319,7 +319,7 @@ def _baseline(
     plans: int,
     planner: PlannerSettings,
     estimator: EstimatorSettings | None,
-    errors: PoseErrors,
+    errors: PosePerturbation,
     grasps: GraspSource | None,
 ) -> BaselinePolicy:
     """The baseline of the configuration's environment."""

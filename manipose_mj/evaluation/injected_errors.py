@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from manipose_mj.errors import InputError
 
 if TYPE_CHECKING:
-    from manipose_mj.control.perception.misled import PoseErrors
+    from manipose_mj.control.perception.perturbed import PosePerturbation
     from manipose_mj.tasks.observations.sensor_config import SensorConfig
 
 
@@ -92,14 +92,14 @@ class InjectedErrors:
         """[s]."""
         return self.latency_ms / 1000
 
-    def pose_errors(self) -> PoseErrors:
+    def pose_errors(self) -> PosePerturbation:
         """Those of the poses that the baseline acts on."""
         # Loads the simulator, as below: workers only.
-        from manipose_mj.control.perception.misled import PoseErrors
+        from manipose_mj.control.perception.perturbed import PosePerturbation
         from manipose_mj.tasks.observations.fixed_error import FixedError
 
         error = FixedError(self.pose_error_cm / 100, math.radians(self.pose_error_deg))
-        return PoseErrors(error, self.assume_upright)
+        return PosePerturbation(error, self.assume_upright)
 
     def of_sensors(self, sensors: SensorConfig) -> SensorConfig:
         """Sensors with these errors: of observed poses, calibration, depth, and how many cameras there are."""

@@ -9,7 +9,7 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj.control.baseline import MAX_PLANS, Baseline
-from manipose_mj.control.perception.misled import NO_ERRORS, PoseErrors
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.pose_sources import check_pose_source
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.planner import TaskPlanner
@@ -33,7 +33,7 @@ class BaselinePolicy:
         planner: TaskPlanner | None = None,
         plans: int = MAX_PLANS,
         estimator: EstimatorSettings | None = None,
-        errors: PoseErrors = NO_ERRORS,
+        errors: PosePerturbation = UNPERTURBED,
         grasps: GraspSource | None = None,
     ) -> None:
         """Acts in no environment yet.

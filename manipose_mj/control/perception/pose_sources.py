@@ -8,8 +8,12 @@ from dm_control import mjcf
 from manipose_mj.assets.asset import Asset
 from manipose_mj.control.perception.estimated import SENSORS, EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
-from manipose_mj.control.perception.misled import NO_ERRORS, MisledPerception, PoseErrors
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.perception.perturbed import (
+    UNPERTURBED,
+    PerturbedPerception,
+    PosePerturbation,
+)
 from manipose_mj.control.perception.source_names import GraspSource, default_grasps
 from manipose_mj.control.scene.scene_estimate import Perception
 from manipose_mj.errors import unknown_name
@@ -38,7 +42,7 @@ def make_perception(
     task: ManipulationTask,
     physics: mjcf.Physics,
     estimator: EstimatorSettings | None = None,
-    errors: PoseErrors = NO_ERRORS,
+    errors: PosePerturbation = UNPERTURBED,
     grasps: GraspSource | None = None,
 ) -> Perception:
     """The perception of one environment.
@@ -56,7 +60,7 @@ def make_perception(
     """
     check_pose_source(pose)
     perception = _perception(pose, task, physics, estimator, grasps or default_grasps(pose))
-    return MisledPerception(perception, task, errors) if errors else perception
+    return PerturbedPerception(perception, task, errors) if errors else perception
 
 
 def _perception(

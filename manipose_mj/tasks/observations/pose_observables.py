@@ -136,7 +136,7 @@ class PoseObservables:
         world_frames = compose(rotations, data.xpos[bodies.ids]) @ bodies.poses
         world[bodies.rows] = world_frames
         if self._error:
-            self._mislead(world)
+            self._perturb(world)
         if self._noise != PoseNoise():
             world[bodies.rows] = self._disturbed(physics, world)[bodies.rows]
         first_goal = len(self._names) - len(self._slots.goals)
@@ -151,7 +151,7 @@ class PoseObservables:
         seen = np.stack([T @ world for T in cameras], axis=1) if cameras else world[:, None][:, :0]
         return world, robot, seen
 
-    def _mislead(self, world: Float[np.ndarray, "n 4 4"]) -> None:
+    def _perturb(self, world: Float[np.ndarray, "n 4 4"]) -> None:
         """Give objects their errors of this episode, in place."""
         assert self._scene.noise_seed is not None
         for name, entity in self._scene.objects.items():

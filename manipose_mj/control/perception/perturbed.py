@@ -1,6 +1,6 @@
 """A perception whose object poses are made wrong on purpose, to measure what an error costs.
 
-Errors are the judge's: they are made from the true pose and the episode's seed, and the planner sees the wrong pose only.
+Errors follow from the seed of the episode's sensors; the planner sees the wrong poses only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class PoseErrors:
+class PosePerturbation:
     """What is wrong with the poses of objects that a baseline acts on.
 
     Attributes:
@@ -38,10 +38,10 @@ class PoseErrors:
         return bool(self.error) or self.upright
 
 
-NO_ERRORS = PoseErrors()
+UNPERTURBED = PosePerturbation()
 
 
-class MisledPerception:
+class PerturbedPerception:
     """Another perception, with errors.
 
     Attributes:
@@ -49,7 +49,9 @@ class MisledPerception:
       last_estimates: The wrong poses of the last observation.
     """
 
-    def __init__(self, perception: Perception, task: ManipulationTask, errors: PoseErrors) -> None:
+    def __init__(
+        self, perception: Perception, task: ManipulationTask, errors: PosePerturbation
+    ) -> None:
         self._perception, self._task, self._errors = perception, task, errors
         self._held: str | None = None
         self._wrong: dict[str, Float[np.ndarray, "4 4"]] = {}
