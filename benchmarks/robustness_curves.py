@@ -69,7 +69,7 @@ class Arguments:
 def main(arguments: Arguments) -> None:
     """Run every size of every error and write the table, a row at a time."""
     with arguments.out.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         for row in _rows(arguments):
             writer.writerow(row)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.depth_noise import KINECT, measure
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics, camera_pose
@@ -101,3 +102,11 @@ def test_late_servos_follow_later_by_the_latency():
 def test_a_latency_is_not_negative():
     with pytest.raises(InputError, match="latency is -1"):
         few_objects.config("/".join(TARGET_POSE), latency=-1.0)
+
+
+@pytest.mark.parametrize("error", ["pose_error", "camera_error"])
+def test_batched_worlds_refuse_errors_that_they_would_not_make(error):
+    sensors = replace(SMALL, **{error: ERROR})
+    config = few_objects.config("/".join(TARGET_POSE), obs_mode="pose", sensors=sensors)
+    with pytest.raises(InputError, match="no errors of poses or cameras"):
+        draw_pool(config, (0,))
