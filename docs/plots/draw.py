@@ -137,8 +137,10 @@ def robustness() -> Figure:
     figure = new_figure(7.2, 4.8)
     for place, (error, label) in enumerate(panels, start=1):
         axes = axes_of(figure, 2, 3, place)
-        for task, colour, marker in zip(tasks, (TEAL, ORANGE, VIOLET), "os^", strict=True):
+        for task, colour, marker in zip(tasks, (TEAL, ORANGE, VIOLET), "os^", strict=False):
             own = [row for row in table if (row["task"], row["error"]) == (task, error)]
+            if not own:
+                continue
             x, won, of, low, high = np.array(
                 [
                     [float(r[c]) for c in ("size", "successes", "episodes", "low", "high")]
@@ -393,6 +395,7 @@ def protocol() -> Figure:
 
 FIGURES = (
     protocol_v1,
+    robustness,
     pose_methods,
     original_labels,
     types,
