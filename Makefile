@@ -29,7 +29,7 @@ lint: $(VENV)/.dev
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
 bench: $(VENV)/.dev
-	$(BIN)/python benchmarks/manipulation_table.py
+	$(BIN)/python benchmarks/manipulation_table.py --play 50
 	$(BIN)/python benchmarks/throughput.py
 
 # Checkers of other libraries, and 2,000 random steps of every task; brings PyTorch.

@@ -1,67 +1,220 @@
-"""Print the manipulation table of the README: the baseline on every task and on real scans.
+"""Print what evaluations of the baseline come to: by family, task, object type, source of grasps and planner.
 
-    python benchmarks/manipulation_table.py --episodes 50
-    python benchmarks/manipulation_table.py --objects BUILT_YCB/006_mustard_bottle ...
+    python benchmarks/manipulation_table.py RUN...                     # tables of any evaluations
+    python benchmarks/manipulation_table.py --play 2 --out RUNS        # play two episodes of every task first
+    python benchmarks/manipulation_table.py --strips docs/results/failures --page docs/results/protocol_v1.md \\
+        --csv docs/plots/protocol_v1.csv                               # the page of the documentation
 
-Rows of built-in objects come from `manipose evaluate TASK... --episodes N --seed 0`; rows of scans
-from the same command with `--objects DIR/NAME`.
+A RUN is a folder that `manipose evaluate` wrote; by default those of the baseline's cards in `leaderboard/`.
+`--strips` draws each failure, which is played once more where it left no trajectory.
 """
 
 from __future__ import annotations
 
-import tempfile
+import csv
+import io
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
+from failure_strips import draw_strips, grasps_of, strip_name
+from tyro.conf import Positional
 
+from manipose_mj.assets import categories
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.cards.run_record import RunRecord, read_run
 from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.records import EpisodeResult, write_atomically
 from manipose_mj.evaluation.runner import evaluate
-from manipose_mj.evaluation.statistics import summarize
-from manipose_mj.suite import ALL_TASKS
+from manipose_mj.evaluation.statistics import wilson_interval
+from manipose_mj.failures import STAGES
+
+LEADERBOARD = Path(__file__).parents[1] / "leaderboard"
+CARDS = ("baseline_true_poses", "baseline_estimated_poses")
+# What tasks are alike in, by how their names begin.
+FAMILIES = {
+    "single object": ("single_object/",),
+    "open": ("articulated/open_",),
+    "close": ("articulated/close_",),
+    "store": ("articulated/store_",),
+    "take out": ("articulated/take_out_",),
+    "clutter": ("clutter/",),
+}
+POSES = ("true", "estimated")
+HEAD = Path(__file__).with_name("manipulation_page.md")
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Attributes: episodes of each row; seed; jobs; objects: built-in ones or asset folders."""
+    """Attributes: runs: folders; play: episodes of every task of protocol v1 to play first; out: where to; jobs; strips:
+    folder for pictures of failures; page, csv: files to write."""
 
-    episodes: int = 50
-    seed: int = 0
-    jobs: int = 2
-    objects: tuple[str, ...] = ()
+    runs: Positional[tuple[Path, ...]] = ()
+    play: int = 0
+    out: Path = Path("manipulation_runs")
+    jobs: int = 1
+    strips: Path | None = None
+    page: Path | None = None
+    csv: Path | None = None
+
+
+@dataclass(frozen=True)
+class Played:
+    """An episode and what its run says of it: `poses`, of `POSES`; `grasps`; `planner`."""
+
+    result: EpisodeResult
+    poses: str
+    grasps: str
+    planner: str
+
+    @property
+    def family(self) -> str:
+        """What the task is about."""
+        return next(
+            name for name, starts in FAMILIES.items() if self.result.task.startswith(starts)
+        )
+
+    @property
+    def object_type(self) -> str:
+        """The labelling rule of the object in question; `scan` where it is none of ours."""
+        try:
+            category, _ = categories.find(self.result.object)
+        except InputError:
+            return "scan"
+        return categories.CATALOGUE[category].object_type
+
+
+GROUPS: dict[str, Callable[[Played], str]] = {
+    "family": lambda played: played.family,
+    "task": lambda played: f"`{played.result.task}`",
+    "object type": lambda played: played.object_type,
+    "source of grasps": lambda played: played.grasps,
+    "planner": lambda played: played.planner,
+}
 
 
 def main(arguments: Arguments) -> None:
-    """Run every row and print the table."""
-    print("| task | object | success at end | 95 % interval | failures | median wall [s] |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    if arguments.objects:
-        for name in arguments.objects:
-            _rows(arguments, ("single_object/target_pose",), name)
-    else:
-        _rows(arguments, tuple("/".join(task) for task in ALL_TASKS), None)
+    """Play, read, draw, print, write: what was asked for."""
+    records = [read_run(folder) for folder in arguments.runs]
+    if arguments.play:
+        records += _played(arguments)
+    if not records:
+        records = [read_run(LEADERBOARD / card / "runs" / "0") for card in CARDS]
+    episodes = [each for record in records for each in episodes_of(record)]
+    if arguments.strips is not None:
+        draw_strips(records, arguments.strips)
+    strips = arguments.strips or LEADERBOARD.parent / "docs" / "results" / "failures"
+    sys.stdout.write(tables(episodes))
+    if arguments.page is not None:
+        write_atomically(arguments.page, page(episodes, strips).encode("utf-8"))
+    if arguments.csv is not None:
+        write_atomically(arguments.csv, table_csv(episodes).encode("utf-8"))
 
 
-def _rows(arguments: Arguments, tasks: tuple[str, ...], name: str | None) -> None:
-    with tempfile.TemporaryDirectory() as out:
+def episodes_of(record: RunRecord) -> list[Played]:
+    """The episodes of a run."""
+    run = record.run
+    poses = "true" if run.get("pose") == "oracle" else "estimated"
+    planner = (run.get("planner") or {}).get("kind", "rules")
+    return [Played(result, poses, grasps_of(run), planner) for result in record.results]
+
+
+def tables(episodes: Sequence[Played]) -> str:
+    """A table for each way to group them, Markdown."""
+    return "\n".join(f"## By {name}\n\n{table(episodes, name)}" for name in GROUPS)
+
+
+def table(episodes: Iterable[Played], by: str) -> str:
+    """Success and failures with true and with estimated poses, a row for each group."""
+    groups: dict[str, list[Played]] = {}
+    for each in episodes:
+        groups.setdefault(GROUPS[by](each), []).append(each)
+    order = list(FAMILIES) if by == "family" else sorted(groups)
+    lines = [
+        f"| {by} | true poses | Wilson 95 % | failures | estimated poses | Wilson 95 % | failures |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in order:
+        if name in groups:
+            cells = [_cells([e for e in groups[name] if e.poses == poses]) for poses in POSES]
+            lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cells(episodes: Sequence[Played]) -> str:
+    if not episodes:
+        return "- | - | -"
+    results = [each.result for each in episodes]
+    won = sum(result.success_at_end for result in results)
+    low, high = wilson_interval(won, len(results))
+    return f"{won}/{len(results)} | {100 * low:.0f}-{100 * high:.0f}% | {_stages(results)}"
+
+
+def _stages(results: Iterable[EpisodeResult]) -> str:
+    counts = Counter(result.failure for result in results if result.failure)
+    return ", ".join(f"{counts[stage]} {stage}" for stage in STAGES if counts[stage]) or "-"
+
+
+def page(episodes: Sequence[Played], strips: Path) -> str:
+    """`docs/results/protocol_v1.md`: the tables, and every failure with its pictures."""
+    lines = ["| task | start | object | poses | why |", "| --- | --- | --- | --- | --- |"]
+    for each in episodes:
+        result = each.result
+        if result.failure is None:
+            continue
+        why = f"{result.failure}: {result.reason}"
+        picture = strip_name(result, each.poses)
+        if (strips / picture).is_file():
+            why = f"[{result.failure}]({strips.name}/{picture}): {result.reason}"
+        lines.append(
+            f"| `{result.task}` | {result.episode} | `{result.object}` | {each.poses} | {why} |"
+        )
+    head = HEAD.read_text(encoding="utf-8")
+    return head.replace("<!-- tables -->\n", tables(episodes)).replace(
+        "<!-- failures -->", "\n".join(lines)
+    )
+
+
+def table_csv(episodes: Iterable[Played]) -> str:
+    """What `docs/plots/draw.py` draws."""
+    groups: dict[tuple[str, str], list[EpisodeResult]] = {}
+    for each in episodes:
+        groups.setdefault((each.poses, each.result.task), []).append(each.result)
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(("poses", "task", "successes", "episodes", "failures", "deepest_contact_mm"))
+    for (poses, task), results in groups.items():
+        won, failures = sum(r.success_at_end for r in results), _stages(results)
+        deepest = 1000 * max(r.max_penetration for r in results)
+        writer.writerow(
+            (poses, task, won, len(results), "" if failures == "-" else failures, f"{deepest:.1f}")
+        )
+    return stream.getvalue()
+
+
+def _played(arguments: Arguments) -> list[RunRecord]:
+    """Runs of every task with true and with estimated poses; what is there already is not played again."""
+    records = []
+    for pose in ("oracle", "estimated"):
         config = EvaluationConfig(
-            tasks,
-            Path(out) / "run",
-            episodes=arguments.episodes,
-            seed=arguments.seed,
+            tuple(protocol.load("v1").tasks),
+            arguments.out / pose,
+            episodes=arguments.play,
+            pose=pose,
             jobs=arguments.jobs,
-            objects=None if name is None else (name,),
+            protocol="v1",
         )
-        results = evaluate(config)
-    for task, row in summarize(results).items():
-        low, high = row["wilson_95"]
-        failures = ", ".join(f"{stage} {n}" for stage, n in row["failures"].items()) or "none"
-        print(
-            f"| `{task}` | {name or 'built-in'} | {row['success_at_end']} / {row['episodes']} "
-            f"| {low:.2f} - {high:.2f} | {failures} | {row['median_wall_s']:.1f} |",
-            flush=True,
-        )
+        evaluate(config, resume=True)
+        records.append(read_run(config.out))
+    return records
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Arguments))
+    try:
+        main(tyro.cli(Arguments))
+    except InputError as error:
+        sys.exit(str(error))

@@ -48,7 +48,7 @@ def load(
       seed: Of the environment's one random state; episodes follow from it.
       environment_kwargs: More arguments of `composer.Environment`.
       **config: Fields of `EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`, `objects`, `split`,
-        `randomisation`, `sensors`.
+        `randomisation`, `sensors`, `latency`.
 
     Raises:
       InputError: An unknown task, observation or control mode, or objects that the task cannot use.

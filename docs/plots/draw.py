@@ -98,20 +98,73 @@ FAMILIES = {
 
 
 def protocol_v1() -> Figure:
-    """Success of the baseline by family of tasks, with Wilson's interval."""
+    """Success of the baseline by family of tasks with true and with estimated poses, with Wilson's interval."""
     table = rows("protocol_v1")
-    figure = new_figure(7.2, 3.4)
+    figure = new_figure(7.2, 4.2)
     axes = axes_of(figure, grid="x")
-    for y, starts in enumerate(reversed(FAMILIES.values())):
-        own = [row for row in table if row["task"].startswith(starts)]
-        won, of = (sum(int(row[name]) for row in own) for name in ("successes", "episodes"))
-        low, high = wilson_interval(won, of)
-        axes.barh(y, 100 * won / of, color=TEAL, height=0.62)
-        axes.plot([100 * low, 100 * high], [y, y], color=INK, linewidth=1.4)
+    for poses, shift, colour in (("true", 0.19, TEAL), ("estimated", -0.19, ORANGE)):
+        axes.barh([], [], color=colour, label=f"{poses} poses")
+        for y, starts in enumerate(reversed(FAMILIES.values())):
+            own = [r for r in table if r["task"].startswith(starts) and r["poses"] == poses]
+            if not own:
+                continue
+            won, of = (sum(int(row[name]) for row in own) for name in ("successes", "episodes"))
+            low, high = wilson_interval(won, of)
+            axes.barh(y + shift, 100 * won / of, color=colour, height=0.34)
+            axes.plot([100 * low, 100 * high], [y + shift] * 2, color=INK, linewidth=1.4)
     axes.set_yticks(range(len(FAMILIES)), list(reversed(FAMILIES)))
     axes.set_xlim(0, 100)
     axes.set_ylim(-0.7, len(FAMILIES) - 0.3)
     axes.set_xlabel("success at end [%], line: Wilson 95 % interval")
+    axes.legend(
+        frameon=False, labelcolor=INK, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
+    return figure
+
+
+def robustness() -> Figure:
+    """Success of the baseline against the size of each error, a line for each task."""
+    table = rows("robustness")
+    panels = (
+        ("pose_error_cm", "pose error [cm]"),
+        ("pose_error_deg", "pose error [deg]"),
+        ("latency_ms", "latency [ms]"),
+        ("camera_error_deg", "calibration error [deg]"),
+        ("depth_noise", "depth noise [of a Kinect]"),
+        ("cameras", "cameras"),
+    )
+    tasks = {row["task"]: None for row in table}
+    figure = new_figure(7.2, 4.8)
+    for place, (error, label) in enumerate(panels, start=1):
+        axes = axes_of(figure, 2, 3, place)
+        for task, colour, marker in zip(tasks, (TEAL, ORANGE, VIOLET), "os^", strict=False):
+            own = [row for row in table if (row["task"], row["error"]) == (task, error)]
+            if not own:
+                continue
+            x, won, of, low, high = np.array(
+                [
+                    [float(r[c]) for c in ("size", "successes", "episodes", "low", "high")]
+                    for r in own
+                ]
+            ).T
+            axes.fill_between(x, 100 * low, 100 * high, color=colour, alpha=0.12, linewidth=0)
+            axes.plot(x, 100 * won / of, f"{marker}-", color=colour, label=task)
+        axes.set_ylim(-4, 104)
+        axes.set_xlabel(label)
+        if error == "cameras":
+            axes.set_xticks((1, 2, 3))
+        if place in (1, 4):
+            axes.set_ylabel("success at end [%]")
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        names,
+        loc="outside lower center",
+        ncols=3,
+        frameon=False,
+        labelcolor=INK,
+        fontsize=7,
+    )
     return figure
 
 
@@ -342,6 +395,7 @@ def protocol() -> Figure:
 
 FIGURES = (
     protocol_v1,
+    robustness,
     pose_methods,
     original_labels,
     types,

@@ -71,6 +71,8 @@ def _require_batchable(config: EnvConfig) -> None:
             raise unknown_name("observation mode of batched worlds", mode, OBSERVED)
     if config.sensors.pose_noise != PoseNoise():
         raise InputError("pose noise is not available in batched worlds: set sensors without it")
+    if config.sensors.pose_error or config.sensors.camera_error:
+        raise InputError("batched worlds know no errors of poses or cameras: set sensors without")
 
 
 class _Drawing:

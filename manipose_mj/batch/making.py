@@ -50,7 +50,7 @@ def make(
       processes: Of the engine `c`.
       visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
-        `objects`, `split`, `randomisation`, `sensors`.
+        `objects`, `split`, `randomisation`, `sensors`, `latency`.
 
     Raises:
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.

@@ -6,13 +6,15 @@ import time
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, one_thread_per_process
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 
 BASELINE = "baseline"
+NO_ERRORS = InjectedErrors()
 
 
 def evaluate(
@@ -51,6 +53,10 @@ def evaluate(
     give_cad: Annotated[bool, arg(help_behavior_hint="")] = False,
     engine: Annotated[Literal["c", "warp"] | None, arg(help_behavior_hint="")] = None,
     worlds: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None,
+    grasps: Annotated[
+        Literal["annotated", "shape", "cloud"] | None, arg(help_behavior_hint="")
+    ] = None,
+    errors: Annotated[InjectedErrors, OmitArgPrefixes] = NO_ERRORS,
 ) -> int:
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
@@ -91,6 +97,9 @@ def evaluate(
       give_cad: Give it the mesh of the very object that is seen; the results say so.
       engine: Play a policy that has a method act in batched worlds: c on the CPU, warp on a GPU.
       worlds: Of these, by default 256.
+      grasps: Where the baseline's grasps come from: the object's own, the shape that was fitted to its cloud, or the
+        cloud; by default annotated with true poses and cloud with estimated ones.
+      errors: Made on purpose, to measure what they cost.
     """
     one_thread_per_process()
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
@@ -141,6 +150,8 @@ def evaluate(
         planner=planning,
         estimator=chosen_estimator(estimator, estimator_args, give_cad),
         batch=batch,
+        errors=errors,
+        grasps=grasps,
     )
     named = check_names(tasks, objects)
     if config.estimator is not None:

@@ -16,8 +16,10 @@ from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.pose_sources import make_perception
 from manipose_mj.control.perception.protocol import Perception
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
 from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
@@ -74,6 +76,8 @@ class Baseline:
         pose: str = "oracle",
         planner: TaskPlanner | None = None,
         estimator: EstimatorSettings | None = None,
+        errors: PosePerturbation = UNPERTURBED,
+        grasps: GraspSource | None = None,
     ) -> None:
         """Compiles the planner's models; those of another scene when an episode has one.
 
@@ -82,11 +86,15 @@ class Baseline:
           pose: Where object poses come from, one of `POSE_SOURCES`.
           planner: Makes the plans; by default by rules.
           estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+          errors: Made to the poses of objects on purpose.
+          grasps: Where those of objects come from; by default what suits `pose`.
 
         Raises:
           InputError: There is no such source or estimator.
         """
-        self._environment, self._pose, self._estimator = environment, pose, estimator
+        self._environment, self._pose = environment, pose
+        self._estimator, self._errors = estimator, errors
+        self._grasps: GraspSource | None = grasps
         self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
@@ -110,7 +118,9 @@ class Baseline:
     def _compile(self) -> _Scene:
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
-        perception = make_perception(self._pose, task, physics, self._estimator)
+        perception = make_perception(
+            self._pose, task, physics, self._estimator, self._errors, self._grasps
+        )
         return _Scene(physics.model.ptr, perception)
 
     def actions(self, seed: int, plans: int = MAX_PLANS) -> Iterator[Action]:

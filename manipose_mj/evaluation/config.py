@@ -11,9 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from manipose_mj.assets.categories import Split
-from manipose_mj.errors import InputError
+from manipose_mj.control.perception.source_names import (
+    GRASP_SOURCES,
+    GraspSource,
+    default_grasps,
+)
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
 
@@ -59,6 +65,8 @@ class EvaluationConfig:
       planner: Makes the baseline's plans.
       estimator: Whose estimates `pose="estimated"` means; None: those of the package's weights.
       batch: Run a policy in batched worlds; None: in the tasks' own environments, one episode a process.
+      errors: Made on purpose.
+      grasps: Where the baseline's grasps of objects come from; None: as suits `pose`.
     """
 
     tasks: tuple[str, ...]
@@ -75,6 +83,8 @@ class EvaluationConfig:
     planner: PlannerSettings = PlannerSettings()
     estimator: EstimatorSettings | None = None
     batch: BatchSettings | None = None
+    errors: InjectedErrors = InjectedErrors()
+    grasps: GraspSource | None = None
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -99,8 +109,46 @@ class EvaluationConfig:
                 raise InputError(f"worlds is {self.batch.worlds}; expected at least 1")
             if self.policy is None:
                 raise InputError("batched worlds play policies; name one by --policy")
+        self._check_errors()
+        self._check_grasps()
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
+
+    def _check_errors(self) -> None:
+        """Refuse errors that nobody would notice."""
+        errors = self.errors
+        if self.policy is None:
+            if errors.of_cameras and self.pose == "oracle":
+                raise InputError(
+                    f"{errors.of_cameras[0]}: with true poses nobody looks; add --pose estimated"
+                )
+            return
+        if errors.assume_upright:
+            raise InputError("--assume-upright is of the baseline; leave it out with a policy")
+        modes = {part.split("/")[0] for part in self.policy.obs_mode.split("+")}
+        if errors.of_poses and "pose" not in modes:
+            raise InputError("--pose-error: the policy sees no poses; --obs-mode names none")
+        if errors.of_cameras and modes.isdisjoint(("rgb", "depth", "segmentation", "pointcloud")):
+            raise InputError(
+                f"{errors.of_cameras[0]}: the policy sees no images; --obs-mode names none"
+            )
+
+    def _check_grasps(self) -> None:
+        if self.grasps is None:
+            return
+        if self.grasps not in GRASP_SOURCES:
+            raise unknown_name("source of grasps", self.grasps, GRASP_SOURCES)
+        if self.policy is not None:
+            raise InputError("--grasps is of the baseline; leave it out with a policy")
+        if self.grasps != "annotated" and self.pose == "oracle":
+            raise InputError(
+                f"--grasps {self.grasps} needs --pose estimated: with true poses nobody looks"
+            )
+
+    @property
+    def grasp_source(self) -> str | None:
+        """Where the baseline's grasps come from; None for a policy."""
+        return None if self.policy is not None else self.grasps or default_grasps(self.pose)
 
     def _check_protocol(self, frozen: protocol.Protocol) -> None:
         if self.seed or self.objects is not None:
@@ -113,14 +161,15 @@ class EvaluationConfig:
     @property
     def poses(self) -> dict[str, str]:
         """What of a scene the policy knows truly, by estimates or not at all, for reports."""
+        wrong = f", {self.errors.of_poses}" if self.errors.of_poses else ""
         if self.policy is not None:
             source = "true" if self.policy.sees_true_poses else "none"
-            return {"objects": source, "furniture": source}
+            return {"objects": source + wrong, "furniture": source}
         objects = "true" if self.pose == "oracle" else "estimated"
         if self.estimator is not None:
             objects = self.estimator.source
         return {
-            "objects": objects,
+            "objects": objects + wrong,
             "furniture": "estimated" if self.pose == "estimated" else "true",
         }
 
@@ -150,14 +199,16 @@ class EvaluationConfig:
                 control_mode=self.policy.control_mode,
                 objects=self.objects,
                 split=self.split,
-                sensors=feature_sensors(self.policy.obs_mode),
+                sensors=self.errors.of_sensors(feature_sensors(self.policy.obs_mode)),
+                latency=self.errors.latency,
             )
         return EnvConfig(
             task,
             obs_mode="state",
             objects=self.objects,
             split=self.split,
-            sensors=sensors_for(self.pose),
+            sensors=self.errors.of_sensors(sensors_for(self.pose)),
+            latency=self.errors.latency,
         )
 
     def episode_seed(self, task: str, episode: int) -> int:
@@ -194,6 +245,9 @@ class EvaluationConfig:
             "planner": self.planner.identity,
             "estimator": self.estimator and self.estimator.identity,
             "batch": self.batch and dict(vars(self.batch)),
+            "injected errors": self.errors.identity,
+            # With true poses the default has always been the same: older runs can go on.
+            "grasps": self.grasps if self.pose == "oracle" else self.grasp_source,
         }
 
     @property
@@ -207,7 +261,8 @@ class EvaluationConfig:
         whose += self.estimator.words if self.estimator is not None else []
         if self.policy is not None:
             whose = self.policy.words + (self.batch.words if self.batch else [])
-        words += ["--episodes", str(self.episodes), *chosen, *whose]
+        whose += [] if self.grasps is None else ["--grasps", self.grasps]
+        words += ["--episodes", str(self.episodes), *chosen, *whose, *self.errors.words]
         words += ["--jobs", str(self.jobs), "--out", str(self.out)]
         if self.objects is not None:
             words += ["--objects", *self.objects]

@@ -14,6 +14,8 @@ from dm_control import composer
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
@@ -44,6 +46,8 @@ def run_episode(
     plans: int = MAX_PLANS,
     planner: PlannerSettings = BY_RULES,
     estimator: EstimatorSettings | None = None,
+    errors: PosePerturbation = UNPERTURBED,
+    grasps: GraspSource | None = None,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run the baseline for one episode; the same arguments give the same result bit for bit.
 
@@ -57,12 +61,15 @@ def run_episode(
       plans: How many the baseline may try.
       planner: What makes them.
       estimator: Whose estimates they are; None: those of the package's weights.
+      errors: Made to the poses of objects on purpose.
+      grasps: Where those of objects come from; by default what suits `pose`.
 
     Raises:
       InputError: Something named does not exist or cannot be used.
       ServerLostError: The estimator's server went away.
     """
-    environment, policy = environment_of(config), _baseline(config, pose, plans, planner, estimator)
+    environment = environment_of(config)
+    policy = _baseline(config, pose, plans, planner, estimator, errors, grasps)
     naming = Naming(config.task, episode, pose)
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
@@ -312,8 +319,10 @@ def _baseline(
     plans: int,
     planner: PlannerSettings,
     estimator: EstimatorSettings | None,
+    errors: PosePerturbation,
+    grasps: GraspSource | None,
 ) -> BaselinePolicy:
     """The baseline of the configuration's environment."""
-    policy = BaselinePolicy(pose, planner.make(), plans, estimator)
+    policy = BaselinePolicy(pose, planner.make(), plans, estimator, errors, grasps)
     policy.attach(environment_of(config))
     return policy

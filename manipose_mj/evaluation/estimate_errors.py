@@ -7,6 +7,7 @@ from dm_control import mjcf
 
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.perception.estimated import EstimatedPerception, EstimatedPose
+from manipose_mj.control.perception.perturbed import PerturbedPerception
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import pose_error
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -31,7 +32,7 @@ class EstimateErrors:
         """Compare what the last plan was made with; the simulation has not gone on since."""
         perception = self._baseline.perception
         if (
-            not isinstance(perception, EstimatedPerception)
+            not isinstance(perception, EstimatedPerception | PerturbedPerception)
             or perception.last_estimates is self._seen
         ):
             return

@@ -15,10 +15,12 @@ from threading import Lock
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.records import (
@@ -62,6 +64,8 @@ class BaselineRunner:
 
     planner: PlannerSettings
     estimator: EstimatorSettings | None = None
+    errors: InjectedErrors = InjectedErrors()
+    grasps: GraspSource | None = None
 
     def __call__(
         self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
@@ -77,6 +81,8 @@ class BaselineRunner:
                 pose=pose,
                 planner=self.planner,
                 estimator=self.estimator,
+                errors=self.errors.pose_errors(),
+                grasps=self.grasps,
             )
 
 
@@ -142,7 +148,7 @@ def evaluate(
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
-        runner = BaselineRunner(config.planner, config.estimator)
+        runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), _results_file(config.out) as file:
@@ -375,6 +381,7 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
     settings["split"] = config.split
     settings["pose"] = config.pose_source
     settings["poses"] = config.poses
+    settings["grasps"] = config.grasp_source
     return {
         "tasks": summarize(results),
         "versions": versions(),

@@ -67,7 +67,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           terminate_on_success: End an episode in the step in which all goals are met.
           normalise_actions: Take actions in [-1, 1], by the map of `gymnasium.wrappers.RescaleAction`.
           **config: Fields of `manipose_mj.tasks.EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`,
-            `objects`, `split`, `randomisation`, `sensors`.
+            `objects`, `split`, `randomisation`, `sensors`, `latency`.
 
         Raises:
           InputError: A mode, a name or an object cannot be used.

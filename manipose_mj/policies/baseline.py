@@ -9,7 +9,9 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj.control.baseline import MAX_PLANS, Baseline
+from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.pose_sources import check_pose_source
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.planner import TaskPlanner
 from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -31,6 +33,8 @@ class BaselinePolicy:
         planner: TaskPlanner | None = None,
         plans: int = MAX_PLANS,
         estimator: EstimatorSettings | None = None,
+        errors: PosePerturbation = UNPERTURBED,
+        grasps: GraspSource | None = None,
     ) -> None:
         """Acts in no environment yet.
 
@@ -39,13 +43,17 @@ class BaselinePolicy:
           planner: Makes its plans; by default by rules.
           plans: How many it may try.
           estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+          errors: Made to the poses of objects on purpose.
+          grasps: Where those of objects come from; by default what suits `pose`.
 
         Raises:
           InputError: There is no such source of poses.
         """
         check_pose_source(pose)
         self.pose_source = pose
-        self._planner, self._plans, self._estimator = planner, plans, estimator
+        self._planner, self._plans = planner, plans
+        self._estimator, self._errors = estimator, errors
+        self._grasps: GraspSource | None = grasps
         self._environment: composer.Environment | None = None
         self._baseline: Baseline | None = None
         self._actions: Iterator[np.ndarray] = iter(())
@@ -65,7 +73,14 @@ class BaselinePolicy:
         """Act in this environment, after its first reset, from now on."""
         if environment is not self._environment:
             self._environment = environment
-            self._baseline = Baseline(environment, self.pose_source, self._planner, self._estimator)
+            self._baseline = Baseline(
+                environment,
+                self.pose_source,
+                self._planner,
+                self._estimator,
+                self._errors,
+                self._grasps,
+            )
         self.baseline.status = ""  # the generator of actions resets it too late for a first record
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:

@@ -75,7 +75,7 @@ def test_a_lost_server_is_exit_1_and_one_line(tmp_path, monkeypatch, capsys):
 def test_episodes_are_asked_of_it(tmp_path, monkeypatch):
     asked = []
 
-    def run_episode(config, spec, *, episode, pose, estimator, planner):
+    def run_episode(config, spec, *, episode, pose, estimator, planner, errors, grasps):
         asked.append((pose, estimator))
         return fake.make_runner()(config, spec, episode=episode, pose=pose)
 

@@ -30,7 +30,7 @@ from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retr
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
-from manipose_mj.control.scene.collision_query import CONTACT, AttachedObject, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
@@ -116,7 +116,7 @@ class Primitives:
         held, self._held = self._held, None
         if held is None:
             raise StageFailure("plan", f"release {name} while nothing is held")
-        yield from self._let_go(planner, name)
+        yield from self._let_go(planner.touching_support(held.pick.support_allowance), name)
 
     def lower(self, planner: MotionPlanner, name: str) -> Actions:
         """Take what is held straight down until it nearly meets something."""
@@ -145,6 +145,7 @@ class Primitives:
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
+        planner = planner.touching_support(pick.support_allowance)
         estimate, planner = self._observe(planner)
         yield from self._executor.follow(retraction_of(planner, estimate, name))
         # Things turn a little in the hand when their weight comes on it: measure, then plan.
@@ -321,7 +322,7 @@ def _place(
     """How to set down what is held, as if it were held at `T_tcp_label`, near a configuration [rad]."""
     obj = estimate.objects[step.subject]
     way = way_out(estimate, step.poses[0][:3, 3])
-    attached = AttachedObject(obj.body, obj.geoms, pose_tcp @ invert(obj.label.pose))
+    attached = obj.held_at(pose_tcp @ invert(obj.label.pose))
     return find_place(planner, pose_tcp, step.poses, obj.label.symmetry, attached, near, way)
 
 

@@ -29,6 +29,8 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimat
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, rotation_angle
 
+# How much nearer than usual fingers come to the table under a thin object, which they then touch softly [m].
+SOFT_TOUCH = 0.004
 _STANDOFFS = (0.10, 0.06)
 # Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
 # A grasp this far from the label's origin [m] counts as one unit worse than one at it.
@@ -53,6 +55,7 @@ class ObjectPick:
       opening: Of the gripper on approach [m].
       goal: A configuration in which the object is where it shall go; the grasp's own if it goes
         nowhere.
+      support_allowance: As the planner's that found it [m].
     """
 
     free_path: Float[np.ndarray, "t 7"]
@@ -60,6 +63,7 @@ class ObjectPick:
     width: float
     opening: float
     goal: Float[np.ndarray, "7"]
+    support_allowance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,8 @@ def pick_object(
 ) -> ObjectPick:
     """The first grasp, in order of promise, that can be approached and can reach a destination.
 
-    Where there is none, the hand opens wider.
+    Where there is none, the hand opens wider; and where the object is estimated, the fingers may at last touch what
+    it lies on: what is thin may leave them less room than its pose is uncertain by.
 
     Args:
       planner: Plans in the scene of `estimate`.
@@ -87,14 +92,17 @@ def pick_object(
       StageFailure: There is none; the reason says at which filter the last ones fell.
     """
     grasps = object_grasps(obj)
-    try:
-        return _pick(planner, estimate, obj, destinations, grasps)
-    except StageFailure as failure:
-        wider = replace(grasps, margin=WIDE_MARGIN)
+    wider = replace(grasps, margin=WIDE_MARGIN)
+    attempts = [(planner, grasps), (planner, wider)]
+    if obj.uncertainty > 0:
+        attempts.append((planner.touching_support(SOFT_TOUCH), grasps))
+    failures = []
+    for allowing, candidates in attempts:
         try:
-            return _pick(planner, estimate, obj, destinations, wider)
-        except StageFailure:
-            raise failure from None
+            return _pick(allowing, estimate, obj, destinations, candidates)
+        except StageFailure as failure:
+            failures.append(failure)
+    raise failures[0] from None
 
 
 def _pick(
@@ -132,7 +140,7 @@ def _pick(
         query = CollisionQuery(opening=opening)
         free_path = planner.free_path(estimate.joints, approach[0], query)
         if free_path is not None:
-            return ObjectPick(free_path, approach, width, opening, goal)
+            return ObjectPick(free_path, approach, width, opening, goal, planner.support_allowance)
     counts = f"{len(free.index)} grasps of {obj.name} are free to take"
     if not approaches:
         raise StageFailure("plan", f"{counts}, none can have it at its destination")

@@ -42,6 +42,7 @@ class MotionPlanner:
       timestep: Of control [s].
       rng: Of samples for free paths.
       contact_allowance: How far loose objects may be pushed aside where a motion ends in contact [m].
+      support_allowance: How much nearer the gripper may come to what is fixed there [m].
     """
 
     scene: PlanningScene
@@ -49,6 +50,7 @@ class MotionPlanner:
     timestep: float
     rng: np.random.Generator
     contact_allowance: float = 0.0
+    support_allowance: float = 0.0
 
     def within(self, scene: PlanningScene) -> MotionPlanner:
         """The same planner in another scene."""
@@ -57,6 +59,10 @@ class MotionPlanner:
     def allowing(self, contact_allowance: float) -> MotionPlanner:
         """The same planner, where loose objects may be pushed aside so far [m]."""
         return replace(self, contact_allowance=contact_allowance)
+
+    def touching_support(self, support_allowance: float) -> MotionPlanner:
+        """The same planner, where the gripper may come so much nearer to what is fixed [m]."""
+        return replace(self, support_allowance=support_allowance)
 
     def tcp_pose(self, joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
         """`T_world_tcp`."""
@@ -169,7 +175,11 @@ class MotionPlanner:
         return targets
 
     def _allowing(self, query: CollisionQuery) -> CollisionQuery:
-        return replace(query, contact_allowance=self.contact_allowance)
+        return replace(
+            query,
+            contact_allowance=self.contact_allowance,
+            support_allowance=self.support_allowance,
+        )
 
 
 def _thinned(path: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "k 7"]:

@@ -17,6 +17,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.known_shapes import KnownShape, known_shapes
 from manipose_mj.control.perception.object_views import ObjectView, ObjectViews
 from manipose_mj.control.perception.pose_sensing import (
@@ -26,6 +27,7 @@ from manipose_mj.control.perception.pose_sensing import (
     seen_points,
     sense_pose,
 )
+from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
@@ -84,23 +86,30 @@ class EstimatedPerception:
         *,
         estimators: Callable[[str], Estimator] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
+        grasps: GraspSource = "cloud",
     ) -> None:
         """Compiles nothing yet.
 
         Args:
-          task: Of an environment whose sensors are `SENSORS`, or others with the same cameras.
+          task: Of an environment whose sensors are `SENSORS`, or others; it looks through all of their cameras,
+            through `SPARE_CAMERAS` where it has to.
           physics: The environment's.
           world: Furniture and surroundings; those of the simulator by default.
           estimators: The estimator of a category; `PoseEstimator.load` by default.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
+          grasps: Where grasps come from.
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
         self._meshes = meshes
         self._world = world or SimulatedWorld(task, physics)
         self.feels_joints = self._world.feels_joints
-        self._views = ObjectViews(task.task_observables, CAMERAS)
-        self._more_views = ObjectViews(task.task_observables, (*CAMERAS, *SPARE_CAMERAS))
+        self._grasp_source: GraspSource = grasps
+        names = task.env_config.sensors.camera_names
+        every = tuple(name for name in names if name not in FRONT_CAMERAS) or names
+        usual = tuple(name for name in every if name not in SPARE_CAMERAS) or every
+        self._views = ObjectViews(task.task_observables, usual)
+        self._more_views = ObjectViews(task.task_observables, every)
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
@@ -168,9 +177,10 @@ class EstimatedPerception:
             sensed = self._sensed(name, self._views.of(self._physics, name), shapes)
             if sensed is not None:
                 self._known[name] = sensed
-                self._grasps[name] = sensed.shape.sampled_grasps()
 
     def _build(self) -> None:
+        for name in self._known.keys() - self._grasps.keys():
+            self._grasps[name] = self._grasps_of(name)
         self._world.build({name: sensed.shape.hulls for name, sensed in self._known.items()})
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
@@ -254,6 +264,23 @@ class EstimatedPerception:
         views = self._more_views.of(self._physics, name)
         return sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
 
+    def _grasps_of(self, name: str) -> GraspSet:
+        """For the pose estimated and those that goals ask for."""
+        symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
+        frames = [goal.goal_frame(symmetries) for goal in self._task.goals]
+        rotations = [
+            np.asarray(frame.pose)[:3, :3]
+            for frame in frames
+            if frame is not None and frame.object == name and frame.rotation_counts
+        ]
+        return sensed_grasps(
+            self._grasp_source,
+            self._known[name],
+            self._views.of(self._physics, name) or self._more_views.of(self._physics, name),
+            rotations,
+            lambda: self._task.objects[name].asset,
+        )
+
     def _with_mesh(self, name: str, views: tuple[ObjectView, ...]) -> tuple[ObjectView, ...]:
         """The views as estimators get them: with the object's mesh, if they are given it."""
         if self._meshes is None:
@@ -272,6 +299,7 @@ class EstimatedPerception:
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
             category=self._categories()[name],
+            uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
         )
 
 

@@ -9,8 +9,14 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.control.perception.estimated import FRONT_CAMERAS, SENSORS, EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.perception.perturbed import (
+    UNPERTURBED,
+    PerturbedPerception,
+    PosePerturbation,
+)
 from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.perception.sensed_world import SensedWorld
+from manipose_mj.control.perception.source_names import GraspSource, default_grasps
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
@@ -39,6 +45,8 @@ def make_perception(
     task: ManipulationTask,
     physics: mjcf.Physics,
     estimator: EstimatorSettings | None = None,
+    errors: PosePerturbation = UNPERTURBED,
+    grasps: GraspSource | None = None,
 ) -> Perception:
     """The perception of one environment.
 
@@ -47,28 +55,43 @@ def make_perception(
       task: Of the environment.
       physics: Of the environment.
       estimator: Whose estimates `"estimated"` are; None: those of the package's weights.
+      errors: Made to the poses of objects on purpose.
+      grasps: Where grasps come from; None: those annotated with true poses, else from clouds.
 
     Raises:
       InputError: There is no such source or estimator.
     """
     check_pose_source(pose)
+    perception = _perception(pose, task, physics, estimator, grasps or default_grasps(pose))
+    return PerturbedPerception(perception, task, errors) if errors else perception
+
+
+def _perception(
+    pose: str,
+    task: ManipulationTask,
+    physics: mjcf.Physics,
+    estimator: EstimatorSettings | None,
+    grasps: GraspSource,
+) -> Perception:
     if pose == "oracle":
         return OraclePerception(task, physics)
     world: World
     if pose == "estimated":
-        world = SensedWorld(task, physics, SENSORS.camera_names, FRONT_CAMERAS)
+        cameras = task.env_config.sensors.camera_names
+        front = tuple(name for name in FRONT_CAMERAS if name in cameras) or cameras
+        world = SensedWorld(task, physics, cameras, front)
     else:
         world = SimulatedWorld(task, physics)
     if estimator is None:
-        return EstimatedPerception(task, physics, world)
+        return EstimatedPerception(task, physics, world, grasps=grasps)
     service = load_estimator(estimator)
-
     return EstimatedPerception(
         task,
         physics,
         world,
         estimators=lambda category: ForeignEstimator(service, category),
         meshes=_mesh_of if estimator.give_cad else None,
+        grasps=grasps,
     )
 
 

@@ -46,12 +46,15 @@ class AttachedObject:
       geoms: Mask of its geoms there, `(ngeom,)`.
       pose_tcp: `T_tcp_object`.
       opening: Of the gripper that holds it [m]; None: as observed.
+      uncertainty: How far its surface may be from where the scene has it [m]: so much deeper it may seem to be in
+        what it touches.
     """
 
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     pose_tcp: Float[np.ndarray, "4 4"]
     opening: float | None = None
+    uncertainty: float = 0.0
 
     def pose(self, tcp_pose: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
         """`T_world_object` with the TCP at `T_world_tcp`."""
@@ -59,6 +62,8 @@ class AttachedObject:
 
     def query(self, clearance: Clearance = TRANSIT) -> CollisionQuery:
         """Whether the arm collides while it holds the object."""
+        if clearance.attached < 0:
+            clearance = replace(clearance, attached=clearance.attached - self.uncertainty)
         return CollisionQuery(clearance, opening=self.opening, attached=self)
 
 
@@ -93,6 +98,8 @@ class CollisionQuery:
       attached: What is checked together with the robot.
       contact_allowance: How far loose objects may be pushed aside where the clearance allows
         contact [m].
+      support_allowance: How much nearer the gripper may come to what is fixed, such as the table, where the
+        clearance allows contact [m].
     """
 
     clearance: Clearance = TRANSIT
@@ -100,6 +107,7 @@ class CollisionQuery:
     target: Bool[np.ndarray, "ngeom"] | None = None
     attached: AttachedObject | FixedObject | None = None
     contact_allowance: float = 0.0
+    support_allowance: float = 0.0
 
     def keeping(self, clearance: Clearance) -> CollisionQuery:
         """The same question with another clearance."""

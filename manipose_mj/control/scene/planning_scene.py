@@ -144,6 +144,9 @@ class PlanningScene:
         allowed[one_robot] = clearance.arm
         allowed[robot[first] & robot[second]] = 0.0
         by_gripper = one_robot & (gripper[first] | gripper[second])
+        if clearance.allows_contact and query.support_allowance > 0:
+            fixed = by_gripper & ~(loose[first] | loose[second])
+            allowed[fixed] -= query.support_allowance
         if clearance.allows_contact and query.contact_allowance > 0:
             pushed = (load | by_gripper) & (loose[first] | loose[second])
             # What is attached is loose too, but not what it lies on.

@@ -31,6 +31,7 @@ class ObjectEstimate:
       geoms: Mask of its geoms there, `(ngeom,)`.
       rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
       category: Such as `"mug"`; empty where it is not known.
+      uncertainty: How far its surface may be from where the planning scene has it [m].
     """
 
     name: str
@@ -41,6 +42,7 @@ class ObjectEstimate:
     geoms: Bool[np.ndarray, "ngeom"]
     rests: tuple[StablePose, ...] = ()
     category: str = ""
+    uncertainty: float = 0.0
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:
@@ -56,7 +58,13 @@ class ObjectEstimate:
           tcp_pose: `T_world_tcp`.
           opening: Of the gripper that holds it [m]; None: as observed.
         """
-        return AttachedObject(self.body, self.geoms, invert(tcp_pose) @ self.pose, opening)
+        return self.held_at(invert(tcp_pose) @ self.pose, opening)
+
+    def held_at(
+        self, pose_tcp: Float[np.ndarray, "4 4"], opening: float | None = None
+    ) -> AttachedObject:
+        """The object at `T_tcp_object` in a hand; `opening` as of `attached_to`."""
+        return AttachedObject(self.body, self.geoms, pose_tcp, opening, self.uncertainty)
 
     def placed_at(self, label_pose: Float[np.ndarray, "4 4"]) -> FixedObject:
         """The object with its label at `T_world_label`."""

@@ -179,7 +179,10 @@ def _entry(place: str, record: RunRecord) -> dict[str, Any]:
 
 def _method(run: Mapping[str, Any]) -> dict[str, Any]:
     """Who acted, and what was told truly."""
-    return {name: run.get(name) for name in ("policy", "policy metadata", "pose", "estimator")}
+    method = {name: run.get(name) for name in ("policy", "policy metadata", "pose", "estimator")}
+    # What a run leaves at its default, older runs do not know.
+    chosen = {name: run[name] for name in ("injected errors", "grasps") if run.get(name)}
+    return {**method, **chosen}
 
 
 def _inside(place: Any) -> str:

@@ -24,7 +24,14 @@ def card_markdown(card: Mapping[str, Any]) -> str:
 
 
 def method_text(method: Mapping[str, Any]) -> str:
-    """Who acted and what was told truly, in a line."""
+    """Who acted, what was told truly and what was made wrong on purpose, in a line."""
+    wrong = method.get("injected errors") or {}
+    made = [f"{name.replace('_', ' ')} {value}" for name, value in wrong.items()]
+    grasps = f", grasps by {method['grasps']}" if method.get("grasps") else ""
+    return _who(method) + grasps + (f"; errors made on purpose: {', '.join(made)}" if made else "")
+
+
+def _who(method: Mapping[str, Any]) -> str:
     policy = method.get("policy")
     if policy:
         name = policy.get("name", "?") if isinstance(policy, Mapping) else policy

@@ -35,6 +35,7 @@ class StructuredLight:
         sources measured to some 80 deg; the ramp between is our assumption.
       speckle: Share of pixels that fail anywhere; our assumption.
       near, far: Limits of what is measured [m]; near as of PrimeSense's short-range model.
+      noise: Factor of all standard deviations, for sensors better or worse than the sources'.
     """
 
     focal: float = 585.0
@@ -44,6 +45,7 @@ class StructuredLight:
     speckle: float = 0.002
     near: float = 0.35
     far: float = 5.0
+    noise: float = 1.0
 
 
 KINECT = StructuredLight()
@@ -187,11 +189,12 @@ def measure_with(
     shadow = projector_shadow(depth, focal, sensor.baseline)
     incidence = xp.arccos(xp.clip(xp.where(depth > 0, cosine, 1.0), 0.0, 1.0))
     lit = xp.where(shadow, 0.0, depth)
-    rows, columns = _edges_moved(lit, incidence, focal, sensor.focal, draws.shift)
+    source_focal = sensor.focal / sensor.noise
+    rows, columns = _edges_moved(lit, incidence, focal, source_focal, draws.shift)
     depth, incidence = lit[rows, columns], incidence[rows, columns]
     step = sensor.disparity_step * depth**2
     # What the sources measured includes the steps, whose variance is a twelfth of their square.
-    variance = axial_deviation(depth, incidence) ** 2 - step**2 / 12
+    variance = (sensor.noise * axial_deviation(depth, incidence)) ** 2 - step**2 / 12
     noisy = depth + draws.noise * xp.sqrt(xp.maximum(variance, 0.0))
     first, last = sensor.grazing
     failing = xp.clip((incidence - first) / (last - first), 0.0, 1.0) + sensor.speckle

@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.tasks.core.object_selection import select_assets
 from manipose_mj.tasks.core.randomisation import STRENGTHS
 from manipose_mj.tasks.goals import RewardMode, Tolerance
@@ -37,9 +37,11 @@ class EnvConfig:
       split: Which built-in objects to draw from; train and test objects have nothing in common.
       randomisation: Name of a strength of domain randomisation.
       sensors: Cameras, images, clouds and their noise.
+      latency: By how much servo targets come late, beside what `randomisation` draws [s].
 
     Raises:
-      InputError: A mode, split or strength is unknown; the nearest names are offered.
+      InputError: A mode, split or strength is unknown, and the nearest names are offered; or the latency is
+        negative.
     """
 
     task: str
@@ -50,8 +52,11 @@ class EnvConfig:
     split: Split = "train"
     randomisation: str = "none"
     sensors: SensorConfig = SensorConfig()
+    latency: float = 0.0
 
     def __post_init__(self) -> None:
+        if not 0 <= self.latency < 10:
+            raise InputError(f"latency is {self.latency} s; expected 0 to 10")
         for what, value, known in (
             ("control mode", self.control_mode, (*CONTROL_MODES, PRIMITIVE)),
             ("reward mode", self.reward_mode, REWARD_MODES),
@@ -85,6 +90,7 @@ class EnvOptions(TypedDict, total=False):
     split: Split
     randomisation: str
     sensors: SensorConfig
+    latency: float
 
 
 @dataclass(frozen=True)

@@ -182,6 +182,7 @@ class ManipulationTask(composer.Task):
             self._randomiser = self._make_randomiser(self._physics)
             self._preview = Preview(self._physics, self.scene)
         changes = self._randomiser.draw(rng)
+        changes = replace(changes, latency=changes.latency + self.env_config.latency)
         self._preview.change(changes)
         spec = spec or EpisodeSpec()
         start = self.sample(rng, spec, self._preview)

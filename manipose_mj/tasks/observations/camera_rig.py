@@ -44,8 +44,8 @@ class Frame:
       instance: `(height, width)` int32, which of the task's instances; 0 is everything else.
       exact: What is there; the same as `depth` from an ideal sensor.
       intrinsics: Of the image.
-      pose: `T_world_camera`, OpenCV's axes.
-      rays: `(height * width, 3)`, of each pixel in the world's axes; times the depth it is the way
+      pose: `T_world_camera` as calibration states it, OpenCV's axes.
+      rays: `(height * width, 3)`, of each pixel in the world's axes, likewise; times the depth it is the way
         from the camera to the point.
     """
 
@@ -151,7 +151,9 @@ class CameraRig:
         textured = np.flatnonzero(self._colours.textured[geoms] & (geoms >= 0))
         if len(textured):
             depth = frame.exact.depth.ravel()[pixels[textured], None]
-            points = frame.pose[:3, 3] + frame.rays[pixels[textured]] * depth
+            eye = camera_pose(physics.model.ptr, physics.data.ptr, camera)[:3, 3]
+            rays = self._true_rays(physics, camera, frame.intrinsics)
+            points = eye + rays[pixels[textured]] * depth
             linear = self._colours.at(physics.data.ptr, points, geoms[textured])
             colours[textured] = _as_bytes(linear)
         return colours
@@ -162,8 +164,10 @@ class CameraRig:
         return np.pad(_as_bytes(self._colours.plain()), ((0, 1), (0, 0)))
 
     def pose(self, physics: mjcf.Physics, camera: str) -> Float[np.ndarray, "4 4"]:
-        """`T_world_camera`, OpenCV's axes."""
-        return camera_pose(physics.model.ptr, physics.data.ptr, camera)
+        """`T_world_camera` as calibration states it, OpenCV's axes."""
+        true = camera_pose(physics.model.ptr, physics.data.ptr, camera)
+        error = self._config.camera_error
+        return true @ error.drawn(self._seed, f"camera {camera}") if error else true
 
     def intrinsics(self, physics: mjcf.Physics, camera: str) -> Intrinsics:
         """The pinhole of a camera's images."""
@@ -182,13 +186,22 @@ class CameraRig:
         sensor = self._config.depth_sensor
         if sensor is None:
             return Frame(exact.depth, instance, exact, intrinsics, pose, rays)
-        towards = -np.einsum("ni,ni->n", exact.normal.reshape(-1, 3), rays)
-        cosine = (towards / np.linalg.norm(rays, axis=1)).reshape(exact.depth.shape)
+        true = self._true_rays(physics, camera, intrinsics)
+        towards = -np.einsum("ni,ni->n", exact.normal.reshape(-1, 3), true)
+        cosine = (towards / np.linalg.norm(true, axis=1)).reshape(exact.depth.shape)
         number = self.names.index(camera) + 1
         rng = np.random.default_rng((self._seed, step_number(physics), number))
         noisy = measure(exact.depth.astype(float), cosine, intrinsics, rng, sensor)
         depth = noisy.depth.astype(np.float32)
         return Frame(depth, noisy.moved(instance), exact, intrinsics, pose, rays)
+
+    def _true_rays(
+        self, physics: mjcf.Physics, camera: str, intrinsics: Intrinsics
+    ) -> Float[np.ndarray, "pixels 3"]:
+        """Of each pixel, in the world's axes as the camera really stands."""
+        rotation = camera_pose(physics.model.ptr, physics.data.ptr, camera)[:3, :3]
+        kept = f"{camera}, true" if self._config.camera_error else camera
+        return self._world_rays(kept, rotation, intrinsics)
 
     def _world_rays(
         self, camera: str, rotation: Float[np.ndarray, "3 3"], intrinsics: Intrinsics

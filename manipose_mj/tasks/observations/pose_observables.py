@@ -25,6 +25,7 @@ from manipose_mj.mjcf.objects import ArticulatedObject
 from manipose_mj.poses import SymmetryGroup, compose, invert
 from manipose_mj.tasks.goals import GoalFrame
 from manipose_mj.tasks.observations.declared import Declared, Read, bounded, unbounded
+from manipose_mj.tasks.observations.fixed_error import FixedError
 from manipose_mj.tasks.observations.frames import (
     PosedScene,
     furniture_frames,
@@ -62,6 +63,7 @@ class PoseObservables:
         slots: Slots,
         cameras: Sequence[str],
         noise: PoseNoise,
+        error: FixedError,
     ) -> None:
         """Lays out the names.
 
@@ -71,7 +73,9 @@ class PoseObservables:
           slots: What there may be to see.
           cameras: In whose frames poses are given as well.
           noise: Of what is not a goal.
+          error: Of objects.
         """
+        self._error = error
         self._scene, self._slots, self._cameras, self._noise = scene, slots, cameras, noise
         self._robot = mjcf.get_attachment_frame(robot.mjcf_model)
         parts = {**furniture_frames(slots.furniture), **scene.extra_frames}
@@ -131,6 +135,8 @@ class PoseObservables:
         world = np.zeros((len(self._names), 4, 4))
         world_frames = compose(rotations, data.xpos[bodies.ids]) @ bodies.poses
         world[bodies.rows] = world_frames
+        if self._error:
+            self._perturb(world)
         if self._noise != PoseNoise():
             world[bodies.rows] = self._disturbed(physics, world)[bodies.rows]
         first_goal = len(self._names) - len(self._slots.goals)
@@ -144,6 +150,15 @@ class PoseObservables:
         cameras = [invert(camera_pose(model, raw, name)) for name in self._cameras]
         seen = np.stack([T @ world for T in cameras], axis=1) if cameras else world[:, None][:, :0]
         return world, robot, seen
+
+    def _perturb(self, world: Float[np.ndarray, "n 4 4"]) -> None:
+        """Give objects their errors of this episode, in place."""
+        assert self._scene.noise_seed is not None
+        for name, entity in self._scene.objects.items():
+            axial = entity.asset.label.symmetry.axial
+            world[self._names.index(name)] @= self._error.drawn(
+                self._scene.noise_seed, name, axial=axial
+            )
 
     def _disturbed(
         self, physics: mjcf.Physics, poses: Float[np.ndarray, "n 4 4"]

@@ -10,6 +10,7 @@ import numpy as np
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight
 from manipose_mj.mjcf.cameras.pictures import ENGINES, Engine
+from manipose_mj.tasks.observations.fixed_error import FixedError
 
 DEPTH_MODELS: dict[str, StructuredLight | None] = {"ideal": None, "structured_light": KINECT}
 
@@ -73,6 +74,9 @@ class SensorConfig:
     depth_model: `"ideal"`, `"structured_light"` (a Kinect's noise, which reaches depth, outlines of the
       segmentation and clouds), or a `StructuredLight` of your own.
     pose_noise: Of the observed poses of objects and furniture; goals are exact.
+    pose_error: Of each object's observed pose, the same throughout an episode.
+    camera_error: Of each camera's stated pose, likewise; images are those of the true one, clouds lie where the
+      stated one puts them.
     renderer: Of `rgb`: `"gl"`, `"ray"`, or `"auto"` for GL where it works. Depth, segmentation and
       clouds are the same everywhere: rays give them.
     """
@@ -84,6 +88,8 @@ class SensorConfig:
     object_cloud_size: int = 512
     depth_model: str | StructuredLight = "ideal"
     pose_noise: PoseNoise = PoseNoise()
+    pose_error: FixedError = FixedError()
+    camera_error: FixedError = FixedError()
     renderer: Engine = "auto"
 
     def __post_init__(self) -> None:

@@ -85,7 +85,9 @@ class SensorObservables:
         self._entities = tuple(instances.values())
         self._robot = instances["robot"]
         self._rig = CameraRig(config, arena, instances)
-        self._poses = PoseObservables(scene, self._robot, slots, self._rig.names, config.pose_noise)
+        self._poses = PoseObservables(
+            scene, self._robot, slots, self._rig.names, config.pose_noise, config.pose_error
+        )
         self._clouds = CloudObservables(self._rig, config, shaded="rgb" in modes)
         if not self._rig.names and modes & {*_IMAGES, "pointcloud"}:
             raise InputError(f"observations {observations!r} need a camera; sensors name none")

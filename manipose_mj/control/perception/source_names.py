@@ -1,0 +1,13 @@
+"""Where the grasps of objects come from, by name; loads nothing."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+GraspSource = Literal["annotated", "shape", "cloud"]
+GRASP_SOURCES: tuple[GraspSource, ...] = get_args(GraspSource)
+
+
+def default_grasps(pose: str) -> GraspSource:
+    """What suits a source of poses: what is estimated has no annotations."""
+    return "annotated" if pose == "oracle" else "cloud"
