@@ -300,7 +300,7 @@ class Worlds:
         """One control step later, before anything begins anew; `terminated` says which diverged so far."""
         layout, rows = self.pool.layout, state.row
         simulation, diverged, now = self.engine.advance(state.simulation, rows, targets)
-        diverged = diverged | state.terminated
+        diverged = jnp.logical_or(diverged, state.terminated)
         now = _choose(diverged, state.measurement, now)
         scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
         success = jnp.where(diverged, False, self._goals.success(rows, scene, layout.tolerance))

@@ -41,7 +41,7 @@ class _TimeOnly:
 
 
 class DeniedTask(ManipulationTask):
-    """A task that tells its goals, the categories and masks of things, and what sensors measure."""
+    """A task that tells its goals, the categories and masks of things, what sensors there are and measure."""
 
     def __init__(self, task: ManipulationTask) -> None:
         object.__setattr__(self, "_task", task)
@@ -64,6 +64,9 @@ class DeniedTask(ManipulationTask):
             }
         if name == "task_observables":
             return _Sensors(task.task_observables)
+        if name == "env_config":
+            names = task.env_config.sensors.camera_names
+            return SimpleNamespace(sensors=SimpleNamespace(camera_names=names))
         raise PrivilegedError(f"task.{name}")
 
 
