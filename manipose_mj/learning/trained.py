@@ -11,6 +11,7 @@ import json
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
 from manipose_mj.policies.protocol import ActionSpace
 from manipose_mj.storage.cache_file import new_cache_file
 
+SHIPPED = "open_middle_drawer"
 _FORMAT, _HEADER = 1, "header"
 
 
@@ -105,13 +107,17 @@ class Trained:
 class TrainedPolicy:
     """Plays the mean action; the same observations give the same actions."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str = SHIPPED) -> None:
         """Reads the file.
+
+        Args:
+          path: Of a file, or the name of a policy that ships.
 
         Raises:
           InputError: There is none, or it is no trained policy.
         """
-        self._trained = trained = Trained.load(Path(path))
+        own = Path(str(resources.files("manipose_mj.learning"))) / "weights" / f"{path}.npz"
+        self._trained = trained = Trained.load(own if own.is_file() else Path(path))
         self.metadata = {"trained on": trained.task, "seed": trained.seed}
         self._act = jax.jit(self.act)
 
