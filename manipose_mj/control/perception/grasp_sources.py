@@ -18,9 +18,9 @@ from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.grasp_sampling.grasp_choice import clear_of_plane
 from manipose_mj.poses import invert, transform
 
-_COMMON = (
-    3  # rest poses, the most probable, that an object may be set down in where no goal says how
-)
+# Rest poses, the most probable, that an object may be set down in where no goal says how.
+_COMMON = 3
+_FEW = 60  # grasps of a cloud, of 200 that there may be, below which it is not believed
 
 
 def sensed_grasps(
@@ -47,13 +47,17 @@ def sensed_grasps(
         return _annotated(asset(), shape)
     to_label = invert(sensed.pose)
     normals = np.concatenate([view.normals @ view.T_world_camera[:3, :3].T for view in views])
-    cloud = observed_surface(
-        transform(to_label, seen_points(views)), normals @ to_label[:3, :3].T, shape
-    )
+    points = transform(to_label, seen_points(views))
+    cloud = observed_surface(points, normals @ to_label[:3, :3].T, shape)
     held_in = [resting(shape, rotation) for rotation in (sensed.pose[:3, :3], *rotations)]
     if not rotations:  # it may be set down on any side
         held_in += shape.rests[:_COMMON]
-    return cloud_grasps(cloud, held_in, shape.rests)
+    grasps = cloud_grasps(cloud, held_in, shape.rests)
+    if len(grasps) >= _FEW:
+        return grasps
+    # A cloud that contradicts itself, as of cameras that disagree, leaves a hand no room: believe the shape alone.
+    nothing = np.empty((0, 3))
+    return cloud_grasps(observed_surface(nothing, nothing, shape), held_in, shape.rests)
 
 
 def resting(shape: KnownShape, rotation: Float[np.ndarray, "3 3"]) -> StablePose:

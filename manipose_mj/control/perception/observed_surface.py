@@ -39,15 +39,15 @@ def observed_surface(
     hulls = tuple(Shape("mesh", mesh=convex_hull(hull)) for hull in shape.hulls)
     fitted = union_points(hulls, rng)
     points, normals = completed(points, normals, shape.label)
+    offsets = _offsets(fitted, points, normals) if len(points) else np.zeros(len(fitted.points))
     touch = SurfacePoints(
-        fitted.points + _offsets(fitted, points, normals)[:, None] * fitted.normals,
+        fitted.points + offsets[:, None] * fitted.normals,
         fitted.normals,
         fitted.spacing,
     )
     corners = np.concatenate([np.asarray(hull.surface().vertices) for hull in hulls])
     corners = corners[ConvexHull(corners).vertices]
-    far = cKDTree(fitted.points).query(points)[0] > _OFF
-    lacking = points[far]
+    lacking = points[cKDTree(fitted.points).query(points)[0] > _OFF] if len(points) else points
     lacking = lacking[first_in_cells(lacking / fitted.spacing)] if len(lacking) else lacking
     obstacles = np.concatenate([touch.points, corners, lacking])
     coarse = np.concatenate([corners, obstacles[first_in_cells(obstacles / _COARSE)]])

@@ -119,3 +119,14 @@ def test_every_source_gives_grasps_for_the_rests_of_the_fitted_shape():
         assert len(grasps) and grasps.clear.shape == (len(grasps), 2), source
         if source == "annotated":
             np.testing.assert_allclose(grasps.poses[:, 2, 3], -0.1)
+
+
+def test_a_cloud_that_contradicts_itself_is_not_believed():
+    shape = prism(0.02, 0.02, rounded=True)
+    rng = np.random.default_rng(0)
+    points, normals = seen_bar(0.022, rng)
+    scattered = points + rng.normal(0, 0.03, points.shape)  # cameras that disagree by 3 cm
+    sensed = SensedPose(np.eye(4), shape, 0.01, 0.95, "front")
+    asset: Any = None
+    grasps = sensed_grasps("cloud", sensed, (view(scattered, normals),), (), lambda: asset)
+    assert len(grasps) >= 100
