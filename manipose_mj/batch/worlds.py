@@ -299,11 +299,11 @@ class Worlds:
     def _advanced(self, state: State, targets: Float[Array, "worlds substeps 8"]) -> State:
         """One control step later, before anything begins anew; `terminated` says which diverged so far."""
         layout, rows = self.pool.layout, state.row
-        simulation, diverged, now = self.engine.advance(state.simulation, rows, targets)
-        diverged = jnp.logical_or(diverged, state.terminated)
+        simulation, broken, now = self.engine.advance(state.simulation, rows, targets)
+        diverged: Any = broken | state.terminated
         now = _choose(diverged, state.measurement, now)
         scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
-        success = jnp.where(diverged, False, self._goals.success(rows, scene, layout.tolerance))
+        success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
         return state._replace(
             reward=self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode),
             terminated=diverged,
