@@ -24,7 +24,7 @@ def train_ppo(
     /,
     *,
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
-    worlds: int = 8192,
+    worlds: int = 1024,
     starts: int = 512,
     seed: int = 0,
     minutes: float = 8.0,

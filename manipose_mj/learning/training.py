@@ -48,7 +48,7 @@ class TrainingConfig:
     """
 
     task: str
-    worlds: int = 8192
+    worlds: int = 1024
     starts: int = 512
     first_start: int = 0
     seed: int = 0

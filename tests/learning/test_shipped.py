@@ -25,7 +25,7 @@ def test_it_is_small_and_says_what_it_is():
 
 @pytest.mark.full
 def test_it_opens_drawers_of_cabinets_that_it_was_not_trained_on(tmp_path):
-    """In single environments 83 of 100; of the first 24 these are all but five."""
+    """In single environments 97 of 100; of the first 24 these are all but one."""
     settings = PolicySettings(
         "manipose_mj.learning:TrainedPolicy",
         obs_mode="state+pose",
@@ -38,4 +38,4 @@ def test_it_opens_drawers_of_cabinets_that_it_was_not_trained_on(tmp_path):
     )
     results = evaluate(config)
     assert {result.object for result in results} == {f"cabinet_{i:03}" for i in (4, 14, 19, 24)}
-    assert sum(result.success_at_end for result in results) >= 17
+    assert sum(result.success_at_end for result in results) >= 21
