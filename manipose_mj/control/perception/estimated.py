@@ -179,8 +179,9 @@ class EstimatedPerception:
                 self._known[name] = sensed
 
     def _build(self) -> None:
-        for name in self._known.keys() - self._grasps.keys():
-            self._grasps[name] = self._grasps_of(name)
+        for name in self._known:
+            if name not in self._grasps:
+                self._grasps[name] = self._grasps_of(name)
         self._world.build({name: sensed.shape.hulls for name, sensed in self._known.items()})
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
