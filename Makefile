@@ -35,7 +35,7 @@ bench: $(VENV)/.dev
 # Checkers of other libraries, and 2,000 random steps of every task; brings PyTorch.
 conformance: $(VENV)/.conformance
 	$(BIN)/python -m pytest tests/conformance tests/gym
-	$(BIN)/python benchmarks/random_steps.py
+	$(BIN)/python benchmarks/experiments/random_steps.py
 
 # Stock LeRobot in an environment of its own: 5 GB, Python 3.12. Records, exports, trains for a moment, evaluates.
 LEROBOT_PYTHON ?= python3.12

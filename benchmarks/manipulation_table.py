@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from failure_strips import draw_strips, grasps_of, strip_name
+from pictures.failure_strips import draw_strips, grasps_of, strip_name
 from tyro.conf import Positional
 
 from manipose_mj.assets import categories

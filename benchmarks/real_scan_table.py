@@ -24,10 +24,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
+from pictures.scan_pictures import draw_view
 from pose_table import PAPER
 from rich.console import Console
 from rich.table import Table
-from scan_pictures import draw_view
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
@@ -40,7 +40,6 @@ from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_metrics import PoseErrors, pose_errors, summary
 from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
-from manipose_mj.ppf_jax.points.symmetry import common_symmetry
 from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 log = logging.getLogger("real_scan_table")
@@ -117,10 +116,7 @@ def fits(group: SymmetryGroup, estimator: PoseEstimator) -> bool:
     A network of boxes takes half turns for no change; a carton with a sloping lid has a front, by which
     its axes are named.
     """
-    learnt, own = estimator.trained.model.config.symmetry, common_symmetry([group])
-    requested = (learnt.axial, learnt.unsigned_x, learnt.unsigned_y)
-    has = (own.axial, own.unsigned_x, own.unsigned_y)
-    return all(b or not a for a, b in zip(requested, has, strict=True))
+    return estimator.trained.model.config.symmetry.holds(group)
 
 
 def bar_of(category: str, object_type: str) -> tuple[float, float]:

@@ -6,28 +6,29 @@ Each figure is an SVG whose text and lines take the colours of the reader's ligh
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Iterable
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
+from concept_figures import protocol, symmetry
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
+from plot_style import (
+    BLUE,
+    FAINT,
+    GREY,
+    INK,
+    ORANGE,
+    TEAL,
+    VIOLET,
+    axes_of,
+    legend,
+    new_figure,
+    svg,
+)
 
 from manipose_mj.evaluation.statistics import wilson_interval
-from manipose_mj.poses import SymmetryGroup, compose, pose_error, rotation_about
 
 FOLDER = Path(__file__).parent
-# Stand-ins that no other part of a drawing uses, and what the style below replaces them by.
-INK, FAINT, BOX = "#010203", "#040506", "#070809"
-VARIABLES = {INK: "var(--ink)", FAINT: "var(--faint)", BOX: "var(--box)"}
-STYLE = (
-    "<style>:root{--ink:#1d2125;--faint:#d5d9dd;--box:#eef4f3}"
-    "@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--faint:#434a52;--box:#24313a}}</style>"
-)
-TEAL, ORANGE, VIOLET, GREY, BLUE = "#13907f", "#d9722e", "#8b6fd1", "#8a8f98", "#3d86c6"
 CATEGORIES = ("bowl", "cup", "mug", "box", "hammer", "razor")
 TYPE_COLOURS = {"axial": TEAL, "mirror": ORANGE, "functional": VIOLET}
 
@@ -36,45 +37,6 @@ def rows(name: str) -> list[dict[str, str]]:
     """The lines of a table beside this file, by the names of its columns."""
     with (FOLDER / f"{name}.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def svg(figure: Figure, name: str) -> str:
-    """The figure as SVG with real text; the same figure gives the same bytes."""
-    stream = io.StringIO()
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
-        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
-    text = stream.getvalue()
-    for colour, variable in VARIABLES.items():
-        text = text.replace(colour, variable)
-    text = text.replace("'DejaVu Sans'", "system-ui, 'DejaVu Sans'")
-    start = text.index("<svg")
-    end = text.index(">", start) + 1
-    return text[start:end] + STYLE + text[end:]
-
-
-def axes_of(figure: Figure, *place: int, grid: str = "y") -> Axes:
-    """Empty axes in the colours of the page."""
-    axes = figure.add_subplot(*place)
-    axes.tick_params(colors=INK, length=3)
-    axes.tick_params(which="minor", length=0, labelcolor=INK)
-    for side, spine in axes.spines.items():
-        spine.set_visible(side in ("left", "bottom"))
-        spine.set_color(INK)
-    axes.grid(axis=grid, color=FAINT, linewidth=0.8)  # pyright: ignore[reportArgumentType]
-    axes.set_axisbelow(True)
-    for text in (axes.title, axes.xaxis.label, axes.yaxis.label):
-        text.set_color(INK)
-    return axes
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """A figure of so many inches."""
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def legend(axes: Axes, **options: object) -> None:
-    """The legend without a frame, in the page's ink."""
-    axes.legend(frameon=False, labelcolor=INK, **options)  # pyright: ignore[reportArgumentType]
 
 
 # What tasks of protocol v1 are alike in, by how their names begin.
@@ -319,77 +281,6 @@ def furniture() -> Figure:
     axes.legend(
         frameon=False, labelcolor=INK, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
     )
-    return figure
-
-
-def symmetry() -> Figure:
-    """The rotation error that remains after a turn about X, for each symmetry group."""
-    x_axis = np.array([1.0, 0.0, 0.0])
-    quarter = SymmetryGroup.generated(rotation_about(x_axis, np.pi / 2)[None])
-    groups = (
-        ("none (mug)", SymmetryGroup.identity(), ORANGE),
-        ("half turn (pot)", SymmetryGroup.two_planes(), VIOLET),
-        ("quarter turns (square box)", quarter, BLUE),
-        ("axis (bowl)", SymmetryGroup.about_x(), TEAL),
-    )
-    turns = np.linspace(0, 360, 361)
-    figure = new_figure(7.2, 3.0)
-    axes = axes_of(figure)
-    for name, group, colour in groups:
-        poses = [compose(rotation_about(x_axis, np.deg2rad(t)), np.zeros(3)) for t in turns]
-        errors = [float(pose_error(pose, np.eye(4), group)[1]) for pose in poses]
-        axes.plot(turns, np.rad2deg(errors), color=colour, label=name, linewidth=2)
-    axes.set_xticks(range(0, 361, 90))
-    axes.set_yticks(range(0, 181, 45))
-    axes.set_xlim(0, 360)
-    axes.set_xlabel("turn of the object about its X [deg]")
-    axes.set_ylabel("rotation error [deg]")
-    legend(axes, loc="upper left", fontsize=9)
-    return figure
-
-
-def protocol() -> Figure:
-    """From a frozen seed to an episode's verdict."""
-    boxes = (
-        ("protocol v1", "100 seeds per task\ntest objects"),
-        ("episode start", "objects, poses, goals\nfrom one seed"),
-        ("policy", "observations in,\nactions out"),
-        ("verdict", "success at end, once\nor a failure's stage"),
-        ("report", "rate, Wilson interval,\npictures"),
-    )
-    figure = new_figure(7.2, 1.25)
-    axes = figure.add_subplot()
-    axes.set_axis_off()
-    axes.set_xlim(0, 5)
-    axes.set_ylim(0, 1)
-    for column, (title, text) in enumerate(boxes):
-        box = FancyBboxPatch(
-            (column + 0.04, 0.1),
-            0.8,
-            0.8,
-            boxstyle="round,pad=0,rounding_size=0.06",
-            fc=BOX,
-            ec=TEAL,
-        )
-        axes.add_patch(box)
-        axes.text(
-            column + 0.44,
-            0.72,
-            title,
-            ha="center",
-            va="center",
-            color=INK,
-            weight="bold",
-            fontsize=9,
-        )
-        axes.text(column + 0.44, 0.38, text, ha="center", va="center", color=INK, fontsize=7)
-        if column:
-            axes.annotate(
-                "",
-                (column + 0.03, 0.5),
-                (column - 0.15, 0.5),
-                arrowprops={"arrowstyle": "->", "color": INK},
-            )
     return figure
 
 

@@ -1,4 +1,4 @@
-"""The cards in docs/tasks say what the tasks say: `python benchmarks/task_cards.py` writes them."""
+"""The cards in docs/tasks say what the tasks say: `python benchmarks/pictures/task_cards.py` writes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.places import ROOT
 
 CARDS = ROOT / "docs" / "tasks"
 WHOLE = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer")
-HINT = "cards are out of date: python benchmarks/task_cards.py"
+HINT = "cards are out of date: python benchmarks/pictures/task_cards.py"
 SPECS = {spec.full_name: spec for spec in builtin_tasks()}
 
 

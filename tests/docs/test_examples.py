@@ -49,7 +49,7 @@ def test_commands_in_pages_exist():
     for page in PAGES:
         for block in blocks(page, "sh"):
             for line in block.code.replace("\\\n", " ").splitlines():
-                for script in re.findall(r"\bbenchmarks/\w+\.py", line):
+                for script in re.findall(r"\bbenchmarks/[\w/]+\.py", line):
                     assert (ROOT / script).is_file(), f"{name(page)} names {script}"
                 found = re.match(
                     r"\s*manipose ((?:assets |demos |pose |protocol |train )?[\w-]+)(.*)",

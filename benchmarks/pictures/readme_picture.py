@@ -1,6 +1,6 @@
 """Film the README's picture: the baseline opens a drawer, lays the chips can inside and shuts it.
 
-python benchmarks/readme_picture.py docs/teaser.webp
+python benchmarks/pictures/readme_picture.py docs/teaser.webp
 """
 
 from __future__ import annotations

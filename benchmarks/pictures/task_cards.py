@@ -1,4 +1,4 @@
-"""Write a card for every task, with a picture of its start: python benchmarks/task_cards.py [docs/tasks].
+"""Write a card for every task, with a picture of its start: python benchmarks/pictures/task_cards.py [docs/tasks].
 
 The text comes from the factories' docstrings, the protocol and the tasks themselves; a test holds it to that.
 """
@@ -103,7 +103,7 @@ FAMILIES = {
 }
 HEAD = """# Tasks
 
-*Written by `python benchmarks/task_cards.py`.*
+*Written by `python benchmarks/pictures/task_cards.py`.*
 
 Each card holds a task's goals, tolerances, objects, seeds and observations. [Protocol v1](../results/protocol_v1.md) holds the baseline's
 success rates.

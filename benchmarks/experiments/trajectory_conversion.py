@@ -1,6 +1,6 @@
 """Print how often a recorded success is one still in another control mode, and back again.
 
-    python benchmarks/trajectory_conversion.py --episodes 20 --first 0
+    python benchmarks/experiments/trajectory_conversion.py --episodes 20 --first 0
 
 Recordings in `pd_joint_pos`: successes of the baseline on `single_object/target_pose`; and, because two
 modes cannot turn the hand, straight carries of an upright chips can to another upright place.

@@ -1,6 +1,6 @@
 """Print how often parts come open whose joints are estimated wrongly, with and without feeling the way.
 
-    python benchmarks/joint_errors.py --seeds 2
+    python benchmarks/experiments/joint_errors.py --seeds 2
 
 Everything is estimated from clouds; on top, the axis of every joint is turned by an angle about the way out of the
 front, or, of a drawer, about the vertical. `followed` corrects the joint by the way that the hand goes, `as planned`

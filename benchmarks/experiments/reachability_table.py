@@ -1,6 +1,6 @@
 """The table of poses that the arm can take, made anew: `manipose_mj/mjcf/panda/reachability.npz`.
 
-    python benchmarks/reachability_table.py [--samples 20000000] [--seed 0]
+    python benchmarks/experiments/reachability_table.py [--samples 20000000] [--seed 0]
 
 Samples joint angles evenly, away from limits and singularities, and marks the cells of their TCP poses.
 """

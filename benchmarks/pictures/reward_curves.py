@@ -1,6 +1,6 @@
 """Plot the dense reward along the baseline's successes, one panel for each task.
 
-python benchmarks/reward_curves.py --out rewards.png [--only TASK ...] [--episodes 3] [--jobs N]
+python benchmarks/pictures/reward_curves.py --out rewards.png [--only TASK ...] [--episodes 3] [--jobs N]
 
 Prints, for each success, the rank correlation of reward and time and by how much it falls on the way.
 """

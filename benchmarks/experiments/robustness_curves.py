@@ -1,7 +1,7 @@
 """Measure what errors cost: success of the baseline, or of your estimator, against the size of each error.
 
-    python benchmarks/robustness_curves.py --runs RUNS --out docs/plots/robustness.csv
-    python benchmarks/robustness_curves.py --estimator MODULE:FACTORY --errors depth_noise --runs RUNS --out OWN.csv
+    python benchmarks/experiments/robustness_curves.py --runs RUNS --out docs/plots/robustness.csv
+    python benchmarks/experiments/robustness_curves.py --estimator MODULE:FACTORY --errors depth_noise --runs RUNS --out OWN.csv
     python docs/plots/draw.py
 
 Every size plays the same episodes of protocol v1. A run that was interrupted goes on with the same command.

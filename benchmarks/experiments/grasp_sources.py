@@ -1,7 +1,7 @@
 """Compare sources of grasps: `single_object/target_pose` with estimated poses, one object a category, one start each.
 
-python benchmarks/grasp_sources.py                      # every second category, number 9 of each, cloud and shape
-python benchmarks/grasp_sources.py --every 1 --number 14 --grasps annotated shape cloud
+python benchmarks/experiments/grasp_sources.py                      # every second category, number 9 of each, cloud and shape
+python benchmarks/experiments/grasp_sources.py --every 1 --number 14 --grasps annotated shape cloud
 """
 
 from __future__ import annotations

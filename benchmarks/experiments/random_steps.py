@@ -1,6 +1,6 @@
 """2,000 random steps of every task: deepest contact, warnings, observations outside their specs.
 
-python benchmarks/random_steps.py [--seeds 1] [--only clutter/pick]
+python benchmarks/experiments/random_steps.py [--seeds 1] [--only clutter/pick]
 """
 
 from __future__ import annotations

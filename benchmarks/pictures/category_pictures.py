@@ -1,4 +1,4 @@
-"""Draw the gallery of categories: python benchmarks/category_pictures.py [docs/categories].
+"""Draw the gallery of categories: python benchmarks/pictures/category_pictures.py [docs/categories].
 
 CATEGORY.webp shows the typical specimen with its label's axes, CATEGORY_variants.webp six others. README.md
 shows them with the facts of categories.csv, whose audit `benchmarks/grasp_audit.py` prints.
@@ -30,7 +30,7 @@ TYPES = {
 SYMMETRIES = {"none": "no symmetry", "varies": "symmetry varies"}
 HEAD = """# Categories
 
-*Written by `python benchmarks/category_pictures.py`.*
+*Written by `python benchmarks/pictures/category_pictures.py`.*
 
 3,036 objects in 59 categories need no download. The first picture shows the typical specimen, index 0; the strip shows six others. Axes: X red,
 Y green, Z blue; see [Labels](../concepts/labels.md). Below each name: the [symmetry](../concepts/symmetry.md), the range of the longest

@@ -1,4 +1,4 @@
-"""Draw the pictures of the concept pages: python benchmarks/concept_pictures.py [docs/concepts].
+"""Draw the pictures of the concept pages: python benchmarks/pictures/concept_pictures.py [docs/concepts].
 
 labels.webp shows one object of each kind of label with its axes; frames.webp the frames of a scene.
 """

@@ -1,7 +1,7 @@
 """Build damaged objects of every source, end to end, and count what became of them.
 
     pip install .[dev]
-    python benchmarks/corrupted_inputs.py [--examples 1000] [--limit-s 60] [--seed 0]
+    python benchmarks/experiments/corrupted_inputs.py [--examples 1000] [--limit-s 60] [--seed 0]
 
 The damages are those of `tests/asset_pipeline/sources/damaged_files.py`: files truncated, emptied, missing, with
 NaN, zero area, inverted faces, gigantic coordinates, other units, wrong indices and counts; references and
@@ -30,7 +30,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # its `tests` hold what damages files
+sys.path.insert(0, str(Path(__file__).parents[2]))  # its `tests` hold what damages files
 
 from asset_difference import difference
 

@@ -1,6 +1,6 @@
 """Do the articulated objects of a source behave? Each is built, pulled open, and given a ball to hold.
 
-    python benchmarks/articulated_audit.py ../shared/data/partnet_mobility.tar.xz [--out DIR] [--only 7167 ...]
+    python benchmarks/experiments/articulated_audit.py ../shared/data/partnet_mobility.tar.xz [--out DIR] [--only 7167 ...]
 
 One row an object: its joints, how many of them stay shut for 2 s and then reach 95 % of their range
 under 20 N or 5 N m; how many cavities take a ball of 6 cm through the open drawer or door and keep it;
