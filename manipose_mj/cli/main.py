@@ -10,7 +10,17 @@ from collections.abc import Sequence
 import tyro
 from tyro.extras import SubcommandApp
 
-from manipose_mj.cli import card, demo, demos, doctor, evaluate, render, tasks, view
+from manipose_mj.cli import (
+    card,
+    demo,
+    demos,
+    doctor,
+    evaluate,
+    render,
+    robustness,
+    tasks,
+    view,
+)
 from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.cli.protocol import build_app as build_protocol_app
@@ -27,6 +37,7 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(demo.demo)
     app.command(evaluate.evaluate)
+    app.command(robustness.robustness)
     app.command(card.card)
     app.command(name="list")(tasks.list_tasks)
     app.command(render.render)

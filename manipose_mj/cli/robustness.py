@@ -1,0 +1,108 @@
+"""`manipose robustness`: recorded plans in many other worlds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from manipose_mj.console.process import (
+    CORES,
+    compile_at_once_on_gpus,
+    hush_glfw,
+    one_thread_per_process,
+)
+
+
+def robustness(
+    task: Annotated[Positional[str], arg(metavar="TASK")],
+    /,
+    *,
+    plan_from: Annotated[str, arg(metavar="seeds|DIR")] = "seeds",
+    plans: int = 4,
+    worlds: int = 64,
+    engine: Literal["auto", "c", "warp"] = "auto",
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    seed: int = 0,
+    friction: float = 1.5,
+    mass: float = 1.4,
+    gains: float = 1.2,
+    latency_ms: float = 40.0,
+    shift_cm: float = 1.0,
+    turn_deg: float = 5.0,
+    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    jobs: int = CORES,
+) -> int:
+    """Play recorded plans of the baseline open loop in worlds that differ from that they were made in, and map success.
+
+    Writes robustness.json and robustness.png.
+
+    Args:
+      task: As manipose list names it.
+      plan_from: seeds records plans of the baseline with true poses now; a folder of manipose demos record holds them.
+      plans: How many.
+      worlds: In all, equally many of each plan.
+      engine: warp, on an NVIDIA GPU; c, on the CPU; auto, the former where it runs.
+      out: Folder to write to; without it robustness/NAME.
+      seed: Of the draws.
+      friction: Factor by which friction differs at most, up or down; that of the finger pads stays.
+      mass: The same for objects' masses.
+      gains: The same for the stiffness of the arm's servos.
+      latency_ms: Most by which set-points come late.
+      shift_cm: Most by which objects and furniture stand beside where the plan has them.
+      turn_deg: Most by which they are turned.
+      objects: What plans recorded now draw from: names of built-in objects, asset folders, or folders of them.
+      jobs: Processes.
+    """
+    one_thread_per_process()
+    hush_glfw()
+    compile_at_once_on_gpus()
+    from manipose_mj.batch.making import available_engine, require_worlds
+    from manipose_mj.cli.evaluate import check_names
+    from manipose_mj.console import output
+    from manipose_mj.robustness.plans import recorded_plans
+    from manipose_mj.robustness.replay import replays
+    from manipose_mj.robustness.success_maps import document, draw
+    from manipose_mj.robustness.variation import Variation
+    from manipose_mj.storage.cache_file import new_cache_file
+
+    check_names((task,), objects)
+    require_worlds(worlds)
+    variation = Variation(friction, mass, gains, latency_ms, shift_cm, turn_deg)
+    chosen = available_engine(engine)
+    with output.Progress("plans") as progress:
+
+        def recorded(done: int, total: int) -> None:
+            progress.update(done, total, "recorded")
+
+        found = recorded_plans(
+            task, plan_from, plans, objects=objects or None, jobs=jobs, on_progress=recorded
+        )
+    with output.Progress("worlds") as progress:
+
+        def played(done: int, total: int) -> None:
+            progress.update(done, total, "played")
+
+        ended = replays(
+            found,
+            variation,
+            worlds,
+            seed=seed,
+            engine=chosen,
+            processes=jobs,
+            on_progress=played,
+        )
+    out = out or Path("robustness") / task.rpartition("/")[2]
+    said = document(task, variation, ended, engine=chosen, seed=seed)
+    with new_cache_file(out / "robustness.json") as scratch:
+        scratch.write_text(json.dumps(said, indent=1))
+    with new_cache_file(out / "robustness.png") as scratch:
+        draw(said, scratch)
+    console = output.standard_output()
+    for name, what in (("as_planned", "as planned"), ("varied", "varied")):
+        share = said[name]
+        console.print(f"{what}: {share['successes']} of {share['worlds']} worlds succeeded")
+    console.print(f"map: {out / 'robustness.png'}", soft_wrap=True)
+    return 0
