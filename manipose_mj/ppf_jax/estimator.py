@@ -17,6 +17,13 @@ from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, pose_error
+from manipose_mj.ppf_jax.confidence import (
+    NEAR,
+    Calibration,
+    Scores,
+    calibration_in,
+    scores_of,
+)
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
@@ -33,7 +40,6 @@ from manipose_mj.ppf_jax.weight_files import LabelSet, MethodName, TrainedModel,
 
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
-_SAME = (0.02, np.deg2rad(15.0))  # what confidence is about [m, rad]
 _LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
 
 
@@ -43,9 +49,11 @@ class PoseEstimator:
 
     Attributes:
       trained: The networks, and the categories they were trained on.
+      calibration: Makes probabilities of pose scores; None leaves these as they are.
     """
 
     trained: TrainedModel
+    calibration: Calibration | None = None
 
     @classmethod
     def load(cls, name: str) -> PoseEstimator:
@@ -65,7 +73,7 @@ class PoseEstimator:
         folder = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
         for stem in stems:
             if (folder / f"{stem}.npz").is_file():
-                return cls(_read_once(folder / f"{stem}.npz"))
+                return cls(_read_once(folder / f"{stem}.npz"), calibration_in(folder))
         raise InputError(
             f"no weights for {name} in {folder}; train some with `manipose pose train {name}` "
             "and read them with PoseEstimator.from_file"
@@ -108,21 +116,14 @@ class PoseEstimator:
         Raises:
           InputError: The cloud is no cloud of an object in metres; one line says why.
         """
-        points, normals = _checked(cloud, key)
-        size, model = bucket(len(points)), self.trained.model
-        axial = model.config.symmetry.axial
+        model = self.trained.model
         if not isinstance(model, PoseModel):
+            points, normals = _checked(cloud, key)
             normals = cloud_normals(points) if normals is None else normals
-            found = _estimate(model, *_padded(points, normals, size), key=key)
-            return _as_estimate(found, axial)
-        # Only of the rows that are used: normals take longer than all else outside the networks.
-        sampled = np.asarray(_sample_rows(model, np.arange(size) < len(points), key=key))
-        rows = sampled[sampled < len(points)]
-        first = rows[: model.config.points]
-        normals = cloud_normals(points, first) if normals is None else normals[first]
-        kept, mask = _filled(points[rows], model.config.sample)
-        normals, _ = _filled(normals, model.config.points)
-        return _as_estimate(_estimate_sample(model, kept, normals, mask, key=key), axial)
+            found = _estimate(model, *_padded(points, normals, bucket(len(points))), key=key)
+            return self._as_estimate(found)
+        sample = prepared_sample(model, cloud, key=key)
+        return self._as_estimate(_estimate_sample(model, *sample, key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -145,8 +146,59 @@ class PoseEstimator:
         rows = [_padded(points, normals, size) for points, normals in checked]
         columns = (jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True))
         found = jax.tree.map(np.asarray, estimate_batch(self.trained.model, *columns, key=key))
-        axial = self.trained.model.config.symmetry.axial
-        return [_as_estimate(_row(found, i), axial) for i in range(len(rows))]
+        return [self._as_estimate(_row(found, i)) for i in range(len(rows))]
+
+    def _as_estimate(self, found: Estimates) -> PoseEstimate:
+        poses, extents, confidence = (
+            np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
+        )
+        symmetry = self.trained.model.config.symmetry
+        if self.calibration is not None and found.expected_error is not None:
+            error = np.asarray(found.expected_error)
+            scores = scores_of(poses, confidence, error, symmetry)
+            confidence = self.calibration.of_all(confidence, scores)
+        each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
+        order = distinct_first(poses, symmetry.axial)
+        first = each[0]
+        others = tuple(each[i] for i in order[1:])
+        return PoseEstimate(first.pose, first.extents, first.confidence, others)
+
+
+def view_scores(
+    estimator: PoseEstimator, cloud: AnyCloud, *, key: PRNGKeyArray
+) -> tuple[Float[np.ndarray, "4 4"], Scores]:
+    """The pose that `PoseEstimator.estimate` finds, and what its confidence is made of.
+
+    Raises:
+      InputError: The cloud cannot be used, or the estimator has no pose scorer.
+    """
+    model = estimator.trained.model
+    if not isinstance(model, PoseModel):
+        raise InputError("only our networks score poses")
+    found = _estimate_sample(model, *prepared_sample(model, cloud, key=key), key=key)
+    poses, confidence, error = (
+        np.asarray(leaf) for leaf in (found.poses, found.confidence, found.expected_error)
+    )
+    return poses[0], scores_of(poses, confidence, error, model.config.symmetry)
+
+
+def prepared_sample(
+    model: PoseModel, cloud: AnyCloud, *, key: PRNGKeyArray
+) -> tuple[Float[np.ndarray, "sample 3"], Float[np.ndarray, "seen 3"], Bool[np.ndarray, "sample"]]:
+    """Points, normals and mask of a cloud as `estimate_sample` takes them.
+
+    Raises:
+      InputError: The cloud is no cloud of an object in metres.
+    """
+    points, normals = _checked(cloud, key)
+    size = bucket(len(points))
+    # Only of the rows that are used: normals take longer than all else outside the networks.
+    sampled = np.asarray(_sample_rows(model, np.arange(size) < len(points), key=key))
+    rows = sampled[sampled < len(points)]
+    first = rows[: model.config.points]
+    normals = cloud_normals(points, first) if normals is None else normals[first]
+    kept, mask = _filled(points[rows], model.config.sample)
+    return kept, _filled(normals, model.config.points)[0], mask
 
 
 def bucket(count: int) -> int:
@@ -210,22 +262,11 @@ def _row(found: Estimates, index: int) -> Estimates:
     return jax.tree.map(lambda leaf: leaf[index], found)
 
 
-def _as_estimate(found: Estimates, axial: bool) -> PoseEstimate:
-    poses, extents, confidence = (
-        np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
-    )
-    each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
-    order = distinct_first(poses, axial)
-    first = each[0]
-    others = tuple(each[i] for i in order[1:])
-    return PoseEstimate(first.pose, first.extents, first.confidence, others)
-
-
 def distinct_first(poses: Float[np.ndarray, "h 4 4"], axial: bool) -> list[int]:
     """Rows in their order, but after all others those that are near one before them."""
     group = SymmetryGroup.about_x() if axial else SymmetryGroup.identity()
     shift, turn = pose_error(poses[:, None].astype(float), poses[None].astype(float), group)
-    near = (shift < _SAME[0]) & (turn < _SAME[1])
+    near = (shift < NEAR[0]) & (turn < NEAR[1])
     distinct: list[int] = []
     for row in range(len(poses)):
         if not near[row, distinct].any():

@@ -40,6 +40,13 @@ class CommonSymmetry:
     unsigned_y: bool = False
     boxes: bool = False
 
+    def holds(self, group: SymmetryGroup) -> bool:
+        """Whether an object of this group is one for a network of this symmetry, which ignores turns that it has."""
+        own = common_symmetry([group])
+        requested = (self.axial, self.unsigned_x, self.unsigned_y)
+        has = (own.axial, own.unsigned_x, own.unsigned_y)
+        return all(b or not a for a, b in zip(requested, has, strict=True))
+
 
 def common_symmetry(groups: Iterable[SymmetryGroup]) -> CommonSymmetry:
     """What the symmetry groups of a training set share."""

@@ -15,6 +15,7 @@ from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.points.clouds import SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.rigid.ambiguous_rotations import ambiguous_rotations
+from manipose_mj.ppf_jax.rigid.evidence import Evidence
 from manipose_mj.ppf_jax.rigid.features import (
     STRAY,
     Cloud,
@@ -36,6 +37,8 @@ from manipose_mj.ppf_jax.rigid.refinement import (
 )
 from manipose_mj.ppf_jax.rigid.revolution import RevolutionConfig, refined_axis
 from manipose_mj.ppf_jax.rigid.voting import Hypotheses, VotingConfig, agreement, vote
+
+_BAD_LOGIT = -10.0  # of the pose scorer, for what is no pose
 
 
 @dataclass(frozen=True)
@@ -135,39 +138,6 @@ class Estimates(eqx.Module):
     ambiguous: Bool[Array, "h"] | None = None
 
 
-class Evidence(eqx.Module):
-    """What hypotheses about a cloud are held against.
-
-    Attributes:
-      cloud: The cloud.
-      votes: Some of its votes.
-      log_extents: What the voting network takes the lengths for, in the cloud's units.
-      free: `(m, 3)`, points that the camera looked through, in the cloud's units.
-    """
-
-    cloud: Cloud
-    votes: PairVotes
-    log_extents: Float[Array, "3"]
-    free: Float[Array, "m 3"]
-
-    def fewer(self, points: int) -> Evidence:
-        """The same with the first, which are random, of the cloud's points."""
-        cloud = self.cloud
-        return Evidence(
-            Cloud(
-                points=cloud.points[:points],
-                normals=cloud.normals[:points],
-                views=cloud.views[:points],
-                mask=cloud.mask[:points],
-                centre=cloud.centre,
-                scale=cloud.scale,
-            ),
-            self.votes,
-            self.log_extents,
-            self.free,
-        )
-
-
 def estimate_cloud(
     model: PoseModel,
     points: Float[Array, "n 3"],
@@ -203,6 +173,18 @@ def estimate_sample(
     key: PRNGKeyArray,
 ) -> Estimates:
     """`estimate_cloud` of the rows that `PoseModel.sample_rows` names, with normals of the first of them."""
+    return estimate_with_evidence(model, points, normals, mask, key=key)[0]
+
+
+def estimate_with_evidence(
+    model: PoseModel,
+    points: Float[Array, "sample 3"],
+    normals: Float[Array, "seen 3"],
+    mask: Bool[Array, "sample"],
+    *,
+    key: PRNGKeyArray,
+) -> tuple[Estimates, Evidence]:
+    """`estimate_sample`, and what hypotheses of other views can be held against (`score_poses`)."""
     config = model.config
     _, pair_key, free_key = jax.random.split(key, 3)
     cloud = normalised(points[: len(normals)], normals, mask[: len(normals)])
@@ -239,7 +221,7 @@ def estimate_sample(
         poses = poses.at[0].set(
             _with_refined_axis(poses[0], points, mask, cloud, config.revolution)
         )
-    return Estimates(
+    found = Estimates(
         poses=poses,
         extents=extents[order],
         confidence=likely[order, CONFIDENT_LEVEL],
@@ -247,6 +229,20 @@ def estimate_sample(
         expected_error=expected_error[order],
         ambiguous=is_ambiguous[order],
     )
+    return found, seen
+
+
+def score_poses(
+    model: PoseModel, seen: Evidence, poses: Float[Array, "h 4 4"]
+) -> Float[Array, "h levels"]:
+    """The pose scorer's logits of poses, `T_camera_label` [m], that any view led to.
+
+    Where the networks make nothing of a pose, it gets the logits of a bad one.
+    """
+    cloud = seen.cloud
+    origins = (poses[:, :3, 3] - cloud.centre) / cloud.scale
+    frames = canonicalised(Hypotheses(poses[:, :3, :3], origins), cloud, model.config.symmetry)
+    return jnp.nan_to_num(read(model, seen, frames).logits, nan=_BAD_LOGIT)
 
 
 @eqx.filter_jit

@@ -17,9 +17,9 @@ from manipose_mj.ppf_jax.points.clouds import CloudBatch
 from manipose_mj.ppf_jax.points.rotations import from_vector, to_vector
 from manipose_mj.ppf_jax.points.symmetry import line_cosines, nearest_equivalent, vote_cosines
 from manipose_mj.ppf_jax.rigid.ambiguous_rotations import ambiguous_rotations
+from manipose_mj.ppf_jax.rigid.evidence import Evidence
 from manipose_mj.ppf_jax.rigid.features import Cloud, normalised
 from manipose_mj.ppf_jax.rigid.model import (
-    Evidence,
     PoseModel,
     cast_votes,
     first_votes,

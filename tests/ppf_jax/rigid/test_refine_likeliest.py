@@ -9,9 +9,9 @@ import pytest
 
 from manipose_mj.ppf_jax.points.clouds import batch_clouds
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
+from manipose_mj.ppf_jax.rigid.evidence import Evidence
 from manipose_mj.ppf_jax.rigid.features import normalised
 from manipose_mj.ppf_jax.rigid.model import (
-    Evidence,
     ModelConfig,
     PoseModel,
     ambiguous_frames,
