@@ -13,6 +13,7 @@ from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     ending_free,
+    is_a_stage,
     leads_enough,
     off_surface,
     push_part,
@@ -30,7 +31,7 @@ from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retr
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
-from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
@@ -46,6 +47,7 @@ _BIG_SLIP = (0.01, 0.08)
 _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
+_PUSHES = 2  # of a part
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
@@ -74,21 +76,31 @@ class Primitives:
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
         self._held: _Held | None = None
+        # `T_tcp_label` of grasps that did not hold or led nowhere, and of those objects were last released from.
+        self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
+        self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
 
     @property
     def held(self) -> str | None:
         """What is held."""
         return None if self._held is None else self._held.name
 
-    def grasp_at(self, planner: MotionPlanner, name: str, destination: Step | None) -> Actions:
-        """Take hold of an object, or of a part's handle, in a way that allows the next `move_to`."""
+    def grasp_at(
+        self, planner: MotionPlanner, name: str, destination: Step | None, thorough: bool = False
+    ) -> Actions:
+        """Take hold of an object, or of a part's handle, in a way that allows the next `move_to`.
+
+        `thorough`: whether to look long for one.
+        """
         estimate, planner = self._observe(planner)
         if name in estimate.parts:
             opening = None if destination is None else destination.opening
             pick = pick_part(planner, estimate, estimate.parts[name], opening)
         else:
             poses = () if destination is None else destination.poses
-            pick = pick_object(planner, estimate, estimate.objects[name], poses)
+            slipped = self._slipped.get(name, ())
+            obj = estimate.objects[name]
+            pick = pick_object(planner, estimate, obj, poses, slipped, thorough)
         yield from self._executor.open_to(pick.opening)
         yield from self._executor.follow(pick.free_path)
         yield from self._executor.follow(pick.approach)
@@ -116,7 +128,15 @@ class Primitives:
         held, self._held = self._held, None
         if held is None:
             raise StageFailure("plan", f"release {name} while nothing is held")
+        if not isinstance(held.pick, PartPick):
+            self._released[name] = held.pose_tcp
         yield from self._let_go(planner.touching_support(held.pick.support_allowance), name)
+
+    def avoid_last_grasps(self) -> None:
+        """Objects were set down, and it did not do: take them another way next time."""
+        for name, pose in self._released.items():
+            self._slipped.setdefault(name, []).append(pose)
+        self._released.clear()
 
     def lower(self, planner: MotionPlanner, name: str) -> Actions:
         """Take what is held straight down until it nearly meets something."""
@@ -187,7 +207,7 @@ class Primitives:
             return
         way = way_in_hand(planner, estimate, part, step.opening)
         way = None if way is None else ending_free(planner, part, way)
-        if way is None or not leads_enough(way, part, step.opening):
+        if way is None or not (leads_enough(way, part, step.opening) or is_a_stage(way, part)):
             raise StageFailure("plan", f"the arm cannot carry {part.name} far by its handle")
         yield from self._executor.follow(way.targets(self._executor.timestep))
         moved = self._executor.observe().parts[part.name].opening
@@ -197,19 +217,35 @@ class Primitives:
                 "motion",
                 f"{part.name} is at {moved:.3f}, the hand should have it at {way.openings[-1]:.3f}",
             )
+        if part.joint.kind == "slide" and not leads_enough(way, part, step.opening):
+            raise StageFailure(
+                "motion", f"{part.name} is at {moved:.3f}, the arm takes it no further"
+            )
 
     def _push_part(self, planner: MotionPlanner, name: str, opening: float) -> Actions:
-        """With closed fingers; nothing to do where the part is there already."""
+        """With closed fingers; nothing to do where the part is there already.
+
+        A hand that leaves may drag the part along: it is pushed once more.
+        """
         part = self._executor.observe().parts[name]
-        low, high = part.joint.range
-        if abs(part.opening - opening) < _PUSH_TOLERANCE * (high - low):
-            return
+        span = float(np.ptp(part.joint.range))
+        for _ in range(1 if self._executor.feels_joints else _PUSHES):
+            if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
+                return
+            yield from self._push_once(planner, name, opening)
+            part = self._executor.observe().parts[name]
+        if abs(part.opening - opening) > _OPENING_TOLERANCE * span:
+            raise StageFailure(
+                "motion", f"{name} is at {part.opening:.3f}, should be at {opening:.3f}"
+            )
+
+    def _push_once(self, planner: MotionPlanner, name: str, opening: float) -> Actions:
         yield from self._executor.close()
         estimate, planner = self._observe(planner)
-        low = part.joint.range[0]
+        part = estimate.parts[name]
         beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
-        aim = opening - beyond if opening <= low else opening
-        push = push_part(planner, estimate, estimate.parts[name], aim)
+        aim = opening - beyond if opening <= part.joint.range[0] else opening
+        push = push_part(planner, estimate, part, aim)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
@@ -218,9 +254,10 @@ class Primitives:
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:
             yield from self._executor.follow(back)
-        moved = estimate.parts[name].opening
-        if abs(moved - opening) > _OPENING_TOLERANCE * (high - low):
-            raise StageFailure("motion", f"{name} is at {moved:.3f}, should be at {opening:.3f}")
+        # Fingers that caught on something are still there.
+        estimate, planner = self._observe(planner)
+        if planner.collides(estimate.joints, CollisionQuery(GRAZING)):
+            yield from self._executor.follow(_retreat(planner, estimate, name))
 
     def _push_object(self, planner: MotionPlanner, step: Step) -> Actions:
         """With closed fingers, over the table, then up."""
@@ -256,6 +293,8 @@ class Primitives:
         # A handle may slide along its bar and turn about it; what counts there is the joint.
         is_part = name in estimate.parts
         if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
+            # Where the hand held it before it slipped.
+            self._slipped.setdefault(name, []).append(then)
             raise StageFailure(
                 "grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand"
             )

@@ -31,6 +31,8 @@ _PUSH_STANDOFFS = ((0.05, 0.0), (0.03, 0.0), (0.02, 0.12), (0.02, 0.07))
 # the rest of the way.
 _MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
 _AJAR = 0.5  # of a door, enough to reach behind it [rad]
+# A way that ends sooner is worth it where none goes on: the hand takes hold again from there [m or rad].
+_STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
 _MAX_PUSHES = 24  # for which a way is looked for
 _MAX_TRIES = 12  # complete ways for which an approach is looked for
@@ -75,14 +77,34 @@ def grip_handle(
     if opening is None:
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
-    ways = [
-        way
-        for hold in grips(part)
-        if (led := find_way(planner, part, hold, opening, near=estimate.joints)) is not None
-        and (way := ending_free(planner, part, led)) is not None
-        and (anywhere or leads_enough(way, part, opening))
-    ]
-    ways.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
+    ways: list[PartWay] = []
+    for fingertips in (False, True):
+        led = (
+            find_way(planner, part, hold, opening, near=estimate.joints)
+            for hold in grips(part, fingertips=fingertips)
+        )
+        free = (ending_free(planner, part, way) for way in led if way is not None)
+        found = [way for way in free if way is not None]
+        found.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
+        ways += found
+        far = [way for way in found if anywhere or leads_enough(way, part, opening)]
+        grip = _approached(planner, estimate, part, far)
+        if grip is not None:
+            return grip
+    stages = [way for way in ways if is_a_stage(way, part)]
+    grip = _approached(planner, estimate, part, stages)
+    if grip is not None:
+        return grip
+    raise StageFailure(
+        "plan",
+        f"no grip of {part.name}'s handle works: {len(stages)} could move it, none can be approached",
+    )
+
+
+def _approached(
+    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, ways: list[PartWay]
+) -> HandleGrip | None:
+    """The first of the ways that the hand can come to."""
     # At low handles the wrist is within millimetres of the table: only if nothing else will do.
     for tight in (False, True):
         for way in ways[:_MAX_TRIES]:
@@ -95,10 +117,7 @@ def grip_handle(
             )
             if free_path is not None:
                 return HandleGrip(free_path, approach, wide, way.hold.opening)
-    raise StageFailure(
-        "plan",
-        f"no grip of {part.name}'s handle works: {len(ways)} could move it, none can be approached",
-    )
+    return None
 
 
 def way_in_hand(
@@ -192,6 +211,11 @@ def leads_enough(way: PartWay, part: PartEstimate, opening: float) -> bool:
     if share >= _MIN_SHARE[part.joint.kind]:
         return True
     return part.joint.kind == "hinge" and float(way.openings[-1] - part.opening) >= _AJAR
+
+
+def is_a_stage(way: PartWay, part: PartEstimate) -> bool:
+    """Whether a grip's way is worth letting go at its end and taking hold again."""
+    return abs(float(way.openings[-1]) - part.opening) >= _STAGE[part.joint.kind]
 
 
 def _turned(way: PartWay) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.control.grasping.candidates import (
     WIDE_MARGIN,
@@ -27,7 +27,7 @@ from manipose_mj.control.scene.cavity_mouth import way_out
 from manipose_mj.control.scene.collision_query import CONTACT, AttachedObject, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.poses import invert, rotation_angle
+from manipose_mj.poses import invert, pose_error, rotation_angle
 
 # How much nearer than usual fingers come to the table under a thin object, which they then touch softly [m].
 SOFT_TOUCH = 0.004
@@ -38,6 +38,9 @@ _LEVER = 0.08
 _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
+_THOROUGH = 4  # times as many, where nothing else works
+# Grasps nearer than this to one another hold alike [m, rad].
+_ALIKE = (0.02, 0.5)
 # What can be lifted so far has room around it: a path is taken for granted before it is needed [m].
 _ROOMY = 0.05
 # The approach may brush nothing, but the open fingers pass the object closely.
@@ -76,17 +79,22 @@ def pick_object(
     estimate: SceneEstimate,
     obj: ObjectEstimate,
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
+    slipped: Sequence[Float[np.ndarray, "4 4"]] = (),
+    thorough: bool = False,
 ) -> ObjectPick:
     """The first grasp, in order of promise, that can be approached and can reach a destination.
 
     Where there is none, the hand opens wider; and where the object is estimated, the fingers may at last touch what
-    it lies on: what is thin may leave them less room than its pose is uncertain by.
+    it lies on: what is thin may leave them less room than its pose is uncertain by. Grasps like those that did not
+    hold come last.
 
     Args:
       planner: Plans in the scene of `estimate`.
       estimate: What is where.
       obj: What to take.
       destinations: `T_world_label` that it shall go to, any of them; empty if it only is to be held.
+      slipped: `T_tcp_label` of grasps that did not hold.
+      thorough: Whether to try many more grasps in the end, which takes long.
 
     Raises:
       StageFailure: There is none; the reason says at which filter the last ones fell.
@@ -94,15 +102,31 @@ def pick_object(
     grasps = object_grasps(obj)
     wider = replace(grasps, margin=WIDE_MARGIN)
     attempts = [(planner, grasps), (planner, wider)]
+    if len(slipped):
+        others = grasps.take(np.flatnonzero(~_alike(obj, grasps, np.stack(slipped))))
+        attempts.insert(0, (planner, others))
     if obj.uncertainty > 0:
         attempts.append((planner.touching_support(SOFT_TOUCH), grasps))
+    efforts = [1] * len(attempts)
+    if thorough:
+        attempts.append((planner, grasps))
+        efforts.append(_THOROUGH)
     failures = []
-    for allowing, candidates in attempts:
+    for (allowing, candidates), effort in zip(attempts, efforts, strict=True):
         try:
-            return _pick(allowing, estimate, obj, destinations, candidates)
+            return _pick(allowing, estimate, obj, destinations, candidates, effort)
         except StageFailure as failure:
             failures.append(failure)
     raise failures[0] from None
+
+
+def _alike(
+    obj: ObjectEstimate, grasps: Grasps, slipped: Float[np.ndarray, "k 4 4"]
+) -> Bool[np.ndarray, "n"]:
+    """Which grasps hold the object nearly as one of these, `T_tcp_label`, does."""
+    own = invert(grasps.tcp_poses) @ obj.label_pose
+    apart, turned = pose_error(own[:, None], slipped[None], obj.label.symmetry)
+    return ((apart < _ALIKE[0]) & (turned < _ALIKE[1])).any(axis=1)
 
 
 def _pick(
@@ -111,6 +135,7 @@ def _pick(
     obj: ObjectEstimate,
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     grasps: Grasps,
+    effort: int,
 ) -> ObjectPick:
     reach = reachable(grasps.tcp_poses, estimate.joints)
     if not len(reach.index):
@@ -125,7 +150,7 @@ def _pick(
         if index not in approaches:
             approaches[index] = _approach(planner, grasps, index, joints, obj.geoms)
         approach = approaches[index]
-        if tries == _MAX_TRIES or len(approaches) == _MAX_APPROACHES:
+        if tries == effort * _MAX_TRIES or len(approaches) == effort * _MAX_APPROACHES:
             break
         if approach is None:
             continue

@@ -40,34 +40,36 @@ class BatchIkConfig:
 def forward(joints: Float[np.ndarray, "n 7"]) -> tuple[np.ndarray, np.ndarray]:
     """TCP poses `(n, 4, 4)` in the base frame and geometric Jacobians `(n, 6, 7)`, linear first."""
     n = len(joints)
-    rotation = np.broadcast_to(np.eye(3), (n, 3, 3))
-    position = np.zeros((n, 3))
-    axes, origins = [], []
-    for (a, d, alpha), theta in zip(DH, joints.T, strict=True):
-        ca, sa = np.cos(alpha), np.sin(alpha)
-        position = position + rotation @ np.array([a, -d * sa, d * ca])
-        ct, st = np.cos(theta), np.sin(theta)
-        zero = np.zeros(n)
-        local = np.stack(
-            [
-                np.stack([ct, -st, zero], -1),
-                np.stack([st * ca, ct * ca, zero - sa], -1),
-                np.stack([st * sa, ct * sa, zero + ca], -1),
-            ],
-            -2,
-        )
-        rotation = rotation @ local
-        axes.append(rotation[:, :, 2])
-        origins.append(position)
-    c, s = np.cos(HAND_YAW), np.sin(HAND_YAW)
-    position = position + rotation[:, :, 2] * (FLANGE_OFFSET + TCP_OFFSET)
-    rotation = rotation @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    axis = np.stack(axes, -1)
-    arm = position[:, :, None] - np.stack(origins, -1)
-    jacobian = np.concatenate([np.cross(axis, arm, axis=1), axis], axis=1)
+    # Components first: rows of thousands of numbers instead of thousands of small matrices.
+    x, y, z = np.repeat(np.eye(3)[..., None], n, axis=2)
+    position = np.zeros((3, n))
+    axes, origins = np.empty((2, 3, 7, n))
+    cosines, sines = np.cos(joints.T), np.sin(joints.T)
+    for k, (a, d, alpha) in enumerate(DH):
+        position = position + a * x
+        y, z = _turned(y, z, np.cos(alpha), np.sin(alpha))
+        position += d * z
+        x, y = _turned(x, y, cosines[k], sines[k])
+        axes[:, k], origins[:, k] = z, position
+    position = position + z * (FLANGE_OFFSET + TCP_OFFSET)
+    x, y = _turned(x, y, np.cos(HAND_YAW), np.sin(HAND_YAW))
+    arm = position[:, None] - origins
+    linear = axes[[1, 2, 0]] * arm[[2, 0, 1]] - axes[[2, 0, 1]] * arm[[1, 2, 0]]
+    jacobian = np.concatenate([linear, axes]).transpose(2, 0, 1)
     pose = np.zeros((n, 4, 4))
-    pose[:, :3, :3], pose[:, :3, 3], pose[:, 3, 3] = rotation, position, 1.0
+    pose[:, :3] = np.stack([x, y, z, position]).transpose(2, 1, 0)
+    pose[:, 3, 3] = 1.0
     return pose, jacobian
+
+
+def _turned(
+    u: Float[np.ndarray, "3 n"],
+    v: Float[np.ndarray, "3 n"],
+    cosine: Float[np.ndarray, "n"] | np.floating | float,
+    sine: Float[np.ndarray, "n"] | np.floating | float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two axes, turned from the first towards the second."""
+    return cosine * u + sine * v, cosine * v - sine * u
 
 
 def rotation_vector(rotation: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:

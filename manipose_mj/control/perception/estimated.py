@@ -33,7 +33,7 @@ from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.poses import invert, transform
+from manipose_mj.poses import invert, pose_error, transform
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import TakenOutGoal
 from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
@@ -41,7 +41,8 @@ from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfi
 # What an estimating agent looks through: a depth camera's noise, at a third of its usual pixels.
 CAMERAS = ("front", "left", "right")
 SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
-# Behind the robot and over its shoulders: they see the front of furniture. The first is the highest.
+# Behind the robot and over its shoulders: they see the front of furniture, and what leaves an estimate uncertain. The
+# first is the highest.
 _LOOKED_AT = (0.72, 0.0, 0.15)
 FRONT_VIEWS = (
     CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
@@ -56,8 +57,11 @@ SENSORS = SensorConfig(
     depth_model="structured_light",
     renderer="ray",  # colours that do not depend on the machine; nobody but estimators of others looks
 )
-_SURE = 0.9  # confidence from which on an estimate is kept for as long as it fits what is seen
-_TRUSTED = 0.5  # confidence under which more cameras are asked
+_SURE = 0.6  # confidence from which on an estimate is kept for as long as it fits what is seen
+_TRUSTED = (
+    0.8  # confidence under which all cameras are asked before anything is done with an estimate
+)
+_AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
 _BETTER = 0.9  # of the misfit that is left, for another pose to replace it
 
@@ -92,7 +96,7 @@ class EstimatedPerception:
 
         Args:
           task: Of an environment whose sensors are `SENSORS`, or others; it looks through all of their cameras,
-            through `SPARE_CAMERAS` where it has to.
+            through `SPARE_CAMERAS` and those over the shoulders where it has to.
           physics: The environment's.
           world: Furniture and surroundings; those of the simulator by default.
           estimators: The estimator of a category; `PoseEstimator.load` by default.
@@ -109,7 +113,7 @@ class EstimatedPerception:
         every = tuple(name for name in names if name not in FRONT_CAMERAS) or names
         usual = tuple(name for name in every if name not in SPARE_CAMERAS) or every
         self._views = ObjectViews(task.task_observables, usual)
-        self._more_views = ObjectViews(task.task_observables, every)
+        self._more_views = ObjectViews(task.task_observables, names)
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
@@ -258,12 +262,19 @@ class EstimatedPerception:
     def _sensed(
         self, name: str, views: tuple[ObjectView, ...], shapes: tuple[KnownShape, ...]
     ) -> SensedPose | None:
+        """From these views; from all cameras' where they leave an object uncertain that was not known."""
         estimator = self._load(self._categories()[name])
         sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
-        if sensed is not None and sensed.confidence >= _TRUSTED:
+        if sensed is not None and (sensed.confidence >= _TRUSTED or name in self._known):
             return sensed
         views = self._more_views.of(self._physics, name)
-        return sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
+        second = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
+        if sensed is None or second is None:
+            return second or sensed
+        shift, turn = pose_error(second.pose, sensed.pose, sensed.shape.label.symmetry)
+        if shift < _AGREED[0] and turn < _AGREED[1]:  # the usual cameras are nearer: more precise
+            return replace(sensed, confidence=max(sensed.confidence, second.confidence))
+        return second if second.confidence > sensed.confidence else sensed
 
     def _grasps_of(self, name: str) -> GraspSet:
         """For the pose estimated and those that goals ask for."""

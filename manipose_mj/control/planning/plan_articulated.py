@@ -41,6 +41,7 @@ _DOOR_FRONT = (0.95, 0.75, 0.5, 0.25)
 _SIDEWAYS = (0.0, 0.3, -0.3, 0.6, -0.6, 0.95, -0.95)
 _MAX_PER_WAY = 3  # places in the cavity for each way to lie
 _ENOUGH_HANDS = 8  # grasps with room for the hand, from which on more make no place better
+_STICKS_OUT = 0.003  # of a cavity, by which an object may [m]
 _APART = 0.008  # between objects that lie side by side [m]
 _SAME_SIDE = 0.95  # cosine from which on two verticals are one
 _AREA_SHARES = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
@@ -121,10 +122,9 @@ def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:
 def is_reached(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:
     """Whether the object is where the goal has it."""
     obj, part = estimate.objects[goal.object], estimate.parts[goal.part]
-    inside = lies_inside(obj, part)
     if isinstance(goal, InsideGoal):
-        return inside
-    return not inside and _near_one(obj, poses_in_area(goal, obj))
+        return _lies_all_inside(obj, part)
+    return not lies_inside(obj, part) and _near_one(obj, poses_in_area(goal, obj))
 
 
 def _plans_through(
@@ -176,6 +176,18 @@ def lies_inside(obj: ObjectEstimate, part: PartEstimate) -> bool:
     carrier = part.pose if part.cavity.moves_with_part else part.base_pose
     place_ = (invert(carrier) @ obj.label_pose)[:3, 3] - part.cavity.center
     return bool((np.abs(place_) < part.cavity.extents / 2).all())
+
+
+def _lies_all_inside(obj: ObjectEstimate, part: PartEstimate) -> bool:
+    """Whether no corner of the object sticks out of the part's cavity by much."""
+    if part.cavity is None:
+        return False
+    carrier = part.pose if part.cavity.moves_with_part else part.base_pose
+    pose = invert(carrier) @ obj.label_pose
+    reach = obj.label.reach(pose[:3, :3])[:2]
+    middle = (pose[:3, :3] @ obj.label.center + pose[:3, 3] - part.cavity.center)[:2]
+    sideways = np.abs(middle) + reach <= part.cavity.extents[:2] / 2 + _STICKS_OUT
+    return lies_inside(obj, part) and bool(sideways.all())
 
 
 def _near_one(obj: ObjectEstimate, poses: Poses) -> bool:

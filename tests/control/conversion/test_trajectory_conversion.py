@@ -20,7 +20,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from tests.few_objects import load
 
-SCRIPT = Path(__file__).parents[3] / "benchmarks" / "trajectory_conversion.py"
+SCRIPT = Path(__file__).parents[3] / "benchmarks" / "experiments" / "trajectory_conversion.py"
 # Of the TCP at the end of a converted recording [m]; ends wait for the arm.
 END = 0.002
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.joint_errors import Stiff, opened
+from benchmarks.experiments.joint_errors import Stiff, opened
 from manipose_mj import suite
 from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.control.perception.sensed_world import SensedWorld

@@ -16,6 +16,7 @@ from manipose_mj.control.grasping.handle_grasps import (
     shutting_pushes,
 )
 from manipose_mj.control.grasping.part_motion import PartWay, find_way
+from manipose_mj.control.grasping.part_pick import is_a_stage, leads_enough
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.articulation import joint_motion
 from manipose_mj.control.scene.cavity_mouth import outwards, way_out
@@ -75,6 +76,34 @@ def test_a_gripped_handle_is_led_along_its_arc(scene):
     np.testing.assert_allclose(targets[-1], way.joints[-1], atol=1e-6)
 
 
+def test_fingertips_hold_a_bar_by_its_front(scene):
+    _, _, part = scene
+    front = part.handle.origin + part.handle.rotation[:, 1] * part.handle.extents[1] / 2
+    usual = [_before(hold, part, front) for hold in grips(part)]
+    tips = [_before(hold, part, front) for hold in grips(part, fingertips=True)]
+    assert tips and min(tips) > max(usual)
+    # The pads still overlap the bar.
+    assert min(tips) > 0.0 and max(tips) < 0.004
+
+
+def _before(hold, part: PartEstimate, front: np.ndarray) -> float:
+    """How far the untilted hand's TCP is before the front of the handle [m]."""
+    tcp = hold.tcp_poses(np.array([0.0]))[0]
+    return float((tcp[:3, 3] - front) @ part.handle.rotation[:, 1])
+
+
+def test_a_short_way_is_a_stage(scene):
+    _, _, part = scene
+    hold = next(grips(part))
+
+    def way(end: float) -> PartWay:
+        openings = np.array([part.opening, part.opening + end])
+        return PartWay(hold, np.zeros((2, 7)), openings, np.zeros(2))
+
+    assert is_a_stage(way(0.3), part) and not is_a_stage(way(0.1), part)
+    assert not leads_enough(way(0.3), part, part.joint.range[1])
+
+
 def test_the_hold_of_now_is_the_grip_it_came_from(scene):
     _, _, part = scene
     for hold in list(grips(part))[:2]:
@@ -131,7 +160,7 @@ def test_the_way_out_of_a_cavity_behind_a_door_is_through_its_mouth(scene):
     assert way_out(estimate, inside + [0.0, 0.0, 2.0]) is None
 
 
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize("task", SOLVED)
 def test_the_baseline_does_it(task):
     result, _ = run_episode(

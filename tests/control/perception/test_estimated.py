@@ -173,6 +173,34 @@ def test_low_confidence_brings_in_another_camera(cup, truth):
     assert unsure.asked > sure.asked + 3
 
 
+class Wavering(Recalled):
+    """Says something else from the fourth question on: when all cameras are asked."""
+
+    def __init__(self, first: np.ndarray, then: np.ndarray, extents: np.ndarray) -> None:
+        super().__init__(first, extents, confidence=0.3)
+        self.then = then
+
+    def estimate(self, cloud: Any, *, key: Any) -> PoseEstimate:
+        if self.asked == 3:
+            self.pose_world, self.confidence = self.then, 0.7
+        return super().estimate(cloud, key=key)
+
+
+@pytest.mark.parametrize("agrees", [True, False])
+def test_a_second_look_replaces_what_it_contradicts(cup, truth, agrees):
+    pose, extents = truth
+    other = np.array(pose)
+    if agrees:
+        other[:3, 3] += [0.004, 0.0, 0.0]
+    else:
+        other[:3, :2] *= -1.0
+    perception = _perception(cup, Wavering(pose, other, extents))
+    perception.reset(0)
+    known = perception._known["object"]
+    np.testing.assert_allclose(known.pose, pose if agrees else other, atol=1e-6)
+    assert known.confidence == 0.7
+
+
 def test_what_no_camera_sees_fails_in_perception(cup, truth):
     cup.task.object.place(cup.physics, compose(np.eye(3), np.array([0.5, 0.0, 30.0])))
     cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))

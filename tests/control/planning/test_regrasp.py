@@ -150,7 +150,7 @@ def test_what_is_nearest_in_hand_keeps_its_side_and_its_turn(scene):
 
 
 # The first seeds that ask for something special: a stop on the way, a stop at the shelf.
-@pytest.mark.sample(1)
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("task", "seed", "releases"),
     [
