@@ -19,13 +19,18 @@ _PILED = (
     "box_010", "box_016", "box_028", "box_046", "chips_can_000", "chips_can_001", "drinkbox_000",
     "drinkbox_001", "remote_000", "candle_000", "steel_tape_000", "sausage_000",
 )  # fmt: skip
+# What hides one another and can be taken away again.
+_HIDDEN = (
+    "box_010", "box_016", "box_028", "box_046", "drinkbox_000", "drinkbox_001", "computer_mouse_000",
+    "computer_mouse_001", "steel_tape_000", "camera_000",
+)  # fmt: skip
 
 
 def few(task: str) -> tuple[str, ...]:
     """Names of built-in objects for a task of this package, `"domain/name"`."""
     domain, _, name = task.partition("/")
     if domain == "clutter":
-        return _PILED
+        return _HIDDEN if name == "occluded" else _PILED
     if domain == "single_object":
         mugs = ("mug_000", "mug_001")
         if name == "reorient_mug":

@@ -162,6 +162,7 @@ def _set_physics_options(root: mjcf.RootElement) -> None:
         integrator=INTEGRATOR,
         cone=CONE,
         impratio=IMPRATIO,
+        noslip_iterations=0,  # Composer's own arena states 5
     )
     # What rests is not computed until something that moves touches it; parked objects never are.
     root.option.flag.sleep = "enable"

@@ -23,6 +23,12 @@ def store() -> composer.Environment:
     return load("articulated", "store_chips_can_middle_drawer", seed=0, obs_mode="pose")
 
 
+def test_friction_is_held_by_the_cone_alone(target_pose, store):
+    for environment in (target_pose, store):
+        option = environment.physics.model.opt
+        assert (option.noslip_iterations, option.impratio) == (0, 100.0)
+
+
 def test_every_built_in_object_stays_where_it_is_put(target_pose):
     seen = set()
     for seed in range(10):

@@ -73,7 +73,7 @@ def hands_around(
     usable &= turned[:, :, 2] @ -outwards > _TOWARDS
     if not usable.any():
         return np.zeros((0, 3, 8, 3))
-    hands = np.stack([_hand(float(width)) for width in grasps.widths[usable]])
+    hands = _hands(grasps.widths[usable])
     centers = grasps.poses[usable, :3, 3] @ rotation.T
     return np.einsum("kij,kbcj->kbci", turned[usable], hands) + centers[:, None, None]
 
@@ -110,17 +110,15 @@ def count_clear(
     return int(clear.sum())
 
 
-def _hand(width: float) -> Float[np.ndarray, "b 8 3"]:
-    """Corners of the hand and of its fingers around something of that width, in the TCP's frame [m]."""
+def _hands(widths: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k b 8 3"]:
+    """Corners of the hand and of its opening fingers around things of these widths, in the TCP's frame [m]."""
     half, thickness, back, front = _FINGER
     low, high = (np.array(corner) - [0, 0, TCP_OFFSET] for corner in HAND_BOXES[0])
-    inner = width / 2
-    fingers = [
-        (np.array([-half, side * inner, back]), np.array([half, side * (inner + thickness), front]))
-        for side in (-1.0, 1.0)
-    ]
-    fingers = [
-        (low + [0, min(side, 0) * _OPENING, 0], high + [0, max(side, 0) * _OPENING, 0])
-        for (low, high), side in zip(fingers, (-1.0, 1.0), strict=True)
-    ]
-    return np.stack([low + _CORNERS * (high - low) for low, high in [(low, high), *fingers]])
+    palm = low + _CORNERS * (high - low)
+    boxes = [np.broadcast_to(palm, (len(widths), 8, 3))]
+    inner, outer = widths / 2, widths / 2 + thickness + _OPENING
+    for side in (-1.0, 1.0):
+        near = np.stack([np.full_like(inner, -half), side * inner, np.full_like(inner, back)], 1)
+        far = np.stack([np.full_like(inner, half), side * outer, np.full_like(inner, front)], 1)
+        boxes.append(near[:, None] + _CORNERS * (far - near)[:, None])
+    return np.stack(boxes, axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.clutter.pile_layout import rolls
 from manipose_mj.tasks.core.candidates import Candidates, builtin, chosen, rigid_rows
@@ -20,9 +21,10 @@ OBJECTS = 12  # in a set; a pile is made of some of them
 LONGEST = 0.20  # side of an object; longer ones reach out of a pile [m]
 # What lies flat, and holds up what lies on it.
 _FLAT = (
-    "box", "camera", "clock", "computer_mouse", "container", "drinkbox", "notebook", "remote", "steel_tape",
-    "tissue", "wallet",
+    "box", "camera", "clock", "computer_mouse", "container", "drinkbox", "remote", "steel_tape", "tissue", "wallet",
 )  # fmt: skip
+_GRASPS = 6  # clear of the table, with which an object that lies alone is easily taken
+_OFTEN = 0.5  # of an object's falls, after which it has to lie so
 
 
 @dataclass(frozen=True)
@@ -98,4 +100,15 @@ def _fit_for_piles(asset: Asset) -> None:
         raise InputError(
             f"{asset.folder}: {asset.name} is {1000 * longest:.0f} mm long; piles take up to "
             f"{1000 * LONGEST:.0f} mm"
+        )
+    assert asset.grasps is not None
+    narrow = asset.grasps.widths < MAX_OPENING
+    taken = asset.grasps.clear[narrow].astype(bool).sum(axis=0) >= _GRASPS
+    share = sum(
+        rest.probability for rest, can in zip(asset.stable_poses, taken, strict=True) if can
+    )
+    if share < _OFTEN:
+        raise InputError(
+            f"{asset.folder}: {asset.name} mostly falls so that the gripper cannot take it off the table; "
+            "piles take objects that it can"
         )

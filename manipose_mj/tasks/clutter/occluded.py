@@ -27,8 +27,6 @@ class OccludedConfig(ClutterConfig):
 class ClutterOccluded(Clutter):
     """Bring a target to its goal of which every camera sees 40 % at most when the episode starts."""
 
-    buried = True
-
     def choose_targets(
         self, rng: np.random.RandomState, lying: LyingPile, preview: Preview
     ) -> tuple[int, ...]:

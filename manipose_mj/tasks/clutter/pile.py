@@ -18,7 +18,7 @@ from manipose_mj.tasks.clutter.pile_layout import PileConfig, choose, drops
 from manipose_mj.tasks.clutter.pile_scene import PileScene
 from manipose_mj.tasks.core.start import NoStartError
 
-_ATTEMPTS = 40
+_ATTEMPTS = 20
 _DROP_GAP = 0.012  # between what falls next and what lies there already [m]
 _DROP_SPEED = 0.5  # downwards, to begin with [m/s]
 _FALL_TIME = 0.4  # until the next one falls [s]
@@ -28,6 +28,7 @@ _CALM_TIME = 0.6  # for a pile at rest to be so in fine steps too [s]
 _STILL = (0.0005, 0.005)  # on average [m/s, rad/s]; friction that creeps turns them faster
 # At any moment, half of what counts as rest: meshes that touch in few points tremble [m/s, rad/s].
 _TREMBLING = (REST_LINEAR_SPEED / 2, REST_ANGULAR_SPEED / 2)
+_SETTLES = 0.1  # share of what is hidden that may be seen more before the pile has come to rest
 _PENETRATION = 0.002  # allowed in a pile at rest [m]
 
 
@@ -39,19 +40,27 @@ class Pile:
       objects: `(n,)`, which of the assets lie in it, in the order in which they fell.
       poses: `(n, 4, 4)`, `T_pile_object`.
       supports: `(n, n)`; `[i, j]` says that object `i` rests on object `j`.
-      free: `(n, g)`; `[i, k]` says that a hand can come straight to grasp `k` of object `i` and
-        meet nothing else, of the annotated grasps that hold. False beyond an asset's last.
+      obstacles: `(n, g, n + 1)`; `[i, k, j]` says that a hand that comes straight to grasp `k` of object `i`
+        meets object `j`, or the table, which is last. Beyond an asset's last grasp it meets everything.
     """
 
     objects: Int[np.ndarray, "n"]
     poses: Float[np.ndarray, "n 4 4"]
     supports: Bool[np.ndarray, "n n"]
-    free: Bool[np.ndarray, "n g"]
+    obstacles: Bool[np.ndarray, "n g m"]
 
     @property
     def uncovered(self) -> Bool[np.ndarray, "n"]:
         """Whether nothing rests on an object."""
         return np.asarray(~self.supports.any(axis=0))
+
+    @property
+    def above(self) -> Bool[np.ndarray, "n n"]:
+        """`[j, i]` says that object `j` rests on object `i`, or on one that does."""
+        closed = self.supports
+        for _ in range(len(closed)):
+            closed = closed | (closed @ closed)
+        return closed
 
     @property
     def radius(self) -> float:
@@ -90,6 +99,11 @@ def _dropped(assets: Sequence[Asset], config: PileConfig, rng: np.random.Generat
     for order, drop in enumerate(drops(chosen_assets, config, radius, rng)):
         scene.drop(order, drop.rotation, drop.xy, _DROP_GAP, _DROP_SPEED)
         scene.run(_FALL_TIME)
+    if (
+        config.layout == "cover"
+        and scene.most_seen(0, config.hidden + _SETTLES) > config.hidden + _SETTLES
+    ):
+        return None
     scene.remove_walls()
     if not scene.rest(_REST_TIME, _STILL_TIME, _STILL, config.spread):
         return None
@@ -103,8 +117,11 @@ def _dropped(assets: Sequence[Asset], config: PileConfig, rng: np.random.Generat
         return None
     if config.layout == "stack" and not supports[:, 0].any():
         return None
+    if scene.diverged:
+        return None
     if config.layout == "cover" and scene.most_seen(0, config.hidden) > config.hidden:
         return None
     poses = scene.poses()[kept]
     poses[:, :2, 3] -= poses[:, :2, 3].mean(axis=0)
-    return Pile(chosen[kept], poses, supports, scene.free_grasps()[kept])
+    obstacles = scene.grasp_obstacles()[kept][:, :, [*kept, -1]]
+    return Pile(chosen[kept], poses, supports, obstacles)

@@ -43,7 +43,7 @@ class PileConfig:
     radius: tuple[float, float] = (0.10, 0.16)
     spread: float = 0.21
     on_top: tuple[int, int] = (1, 2)
-    hidden: float = 0.36
+    hidden: float = 0.5
 
     def __post_init__(self) -> None:
         low, high = self.count

@@ -23,12 +23,14 @@ _PARKING_HEIGHT = 10.0
 _HAND_PARKING = (0.0, 0.0, -5.0)
 _STANDOFF = 0.10  # from which a hand comes straight to a grasp [m]
 _FINGER_MARGIN = 0.002  # kept between the open hand and other objects [m]
+_BRUSHED = 0.0005  # depth to which it may meet what it takes [m]
 _TABLE_MARGIN = 0.001  # and the table
 _MIN_LEVEL = 0.5  # of a contact's normal along the vertical, from which on it carries
 # Half of other tasks': what the arm flips over or flings out of a pile spins, and its ends meet other
 # objects at 4 m/s. Contacts in between would not be seen before they are 8 mm deep.
 PILE_TIMESTEP = 0.001  # [s]
 PILE_CONTACT_TIME = 0.0025  # of contacts between objects and table [s]
+_NATIVE_CCD_OFF = int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
 # Bits of MuJoCo's contact filter.
 _OBJECT, _FIXED, _HAND = 1, 2, 4
 
@@ -170,6 +172,13 @@ class PileScene:
         self._touching[self._geom_owner == i] = False
         self._update_touching()
 
+    @property
+    def diverged(self) -> bool:
+        """Whether MuJoCo found the motion unstable, and put everything back to where it waited."""
+        kinds = mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL
+        kinds = *kinds, mujoco.mjtWarning.mjWARN_BADQACC
+        return any(self._data.warning[kind].number for kind in kinds)
+
     def penetration(self) -> float:
         """The deepest overlap of any two objects [m]."""
         return max(0.0, -float(self._data.contact.dist.min(initial=0.0)))
@@ -203,23 +212,27 @@ class PileScene:
                 found[first, second] = True
         return found
 
-    def free_grasps(self) -> Bool[np.ndarray, "n g"]:
-        """`[i, k]`: the open hand's straight way to grasp `k` of object `i` meets nothing else.
+    def grasp_obstacles(self) -> Bool[np.ndarray, "n g m"]:
+        """`[i, k, j]`: the open hand's straight way to grasp `k` of object `i` meets object `j`; last, the table.
 
-        Of the grasps that hold, which come first.
+        Into the table, through the object itself, beyond an object's last grasp, and of an object that rolled away,
+        it meets everything.
         """
         sets = [asset.grasps for asset in self._assets]
-        most = max(0 if grasps is None else grasps.held for grasps in sets)
-        free = np.zeros((len(sets), most), bool)
+        count = len(sets)
+        most = max(0 if grasps is None else len(grasps.widths) for grasps in sets)
+        found = np.ones((count, most, count + 1), bool)
         model, data = self._model, self._data
         parts = [model.body(name).id for name in ("left", "right", "hand")]
         hand = np.isin(model.geom_bodyid, parts)
         mocap = model.body_mocapid[parts]
-        touching = model.geom_contype.copy()
+        touching, flags = model.geom_contype.copy(), model.opt.disableflags
         model.geom_contype[~hand] = 0
+        # What objects fall with finds overlaps of shapes that are apart, where there are margins.
+        model.opt.disableflags &= ~_NATIVE_CCD_OFF
         gripper = ParallelJaw()
         for i, (grasps, pose) in enumerate(zip(sets, self.poses(), strict=True)):
-            for k in range(grasps.held if grasps is not None and self.kept[i] else 0):
+            for k in range(len(grasps.widths) if grasps is not None and self.kept[i] else 0):
                 assert grasps is not None
                 tcp = pose @ grasps.poses[k]
                 half = float(gripper.opening(grasps.widths[k])) / 2
@@ -234,12 +247,16 @@ class PileScene:
                 mujoco.mj_collision(model, data)
                 contact = data.contact
                 met = np.where(hand[contact.geom1], contact.geom2, contact.geom1)
-                met = met[contact.dist < _FINGER_MARGIN]
-                free[i, k] = not (self._geom_owner[met] != i).any()
-        model.geom_contype[:] = touching
+                own = self._geom_owner[met] == i
+                if (contact.dist[own] < -_BRUSHED).any():
+                    continue  # the object itself is in the way of its grasp
+                found[i, k] = False
+                # The table is of no object: -1.
+                found[i, k, self._geom_owner[met[~own & (contact.dist < _FINGER_MARGIN)]]] = True
+        model.geom_contype[:], model.opt.disableflags = touching, flags
         data.mocap_pos[mocap] = _HAND_PARKING
         mujoco.mj_forward(model, data)
-        return free
+        return found
 
     def most_seen(self, i: int, enough: float) -> float:
         """The share of an object that is seen from where most of it is; beyond `enough`, some of it."""
@@ -271,7 +288,7 @@ def _way(before: Float[np.ndarray, "n 7"], now: Float[np.ndarray, "n 7"]) -> np.
 def _compiled(assets: Sequence[Asset], radius: float) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     set_physics(spec.option, _DROP_TIMESTEP)
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
+    spec.option.disableflags |= _NATIVE_CCD_OFF
     spec.memory = 64 * 2**20
     world = spec.worldbody
     table = world.add_geom(

@@ -27,7 +27,9 @@ def pick(env_config: EnvConfig, objects: SceneObjects) -> ClutterPick:
 )
 def multi(env_config: EnvConfig, objects: SceneObjects) -> ClutterMulti:
     """Bring two or three objects of a pile to their goal poses, in any order that works."""
-    return ClutterMulti(objects.assets, ClutterConfig(horizon=180.0, targets=(2, 3)), env_config)
+    return ClutterMulti(
+        objects.assets, ClutterConfig(horizon=180.0, targets=(2, 3), moved=3), env_config
+    )
 
 
 @register_task(
@@ -35,7 +37,9 @@ def multi(env_config: EnvConfig, objects: SceneObjects) -> ClutterMulti:
 )
 def stacked(env_config: EnvConfig, objects: SceneObjects) -> ClutterStacked:
     """Bring an object to its goal pose that lies under others, and drop none off the table."""
-    config = ClutterConfig(horizon=150.0, pile=PileConfig(layout="stack", radius=(0.15, 0.18)))
+    config = ClutterConfig(
+        horizon=150.0, pile=PileConfig(layout="stack", radius=(0.15, 0.18)), moved=3
+    )
     return ClutterStacked(objects.assets, config, env_config)
 
 
@@ -45,4 +49,6 @@ def stacked(env_config: EnvConfig, objects: SceneObjects) -> ClutterStacked:
 def occluded(env_config: EnvConfig, objects: SceneObjects) -> ClutterOccluded:
     """Bring an object to its goal pose of which no camera sees more than 40 % at the start."""
     pile = PileConfig(layout="cover", radius=(0.15, 0.18))
-    return ClutterOccluded(objects.assets, OccludedConfig(horizon=150.0, pile=pile), env_config)
+    return ClutterOccluded(
+        objects.assets, OccludedConfig(horizon=150.0, pile=pile, moved=5), env_config
+    )

@@ -13,8 +13,6 @@ from manipose_mj.tasks.goals import Goal, OnTableGoal
 class ClutterStacked(Clutter):
     """Bring the target to its goal; what lies on it has to be moved, and nothing may fall off the table."""
 
-    buried = True
-
     def choose_targets(
         self, rng: np.random.RandomState, lying: LyingPile, preview: Preview
     ) -> tuple[int, ...]:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from math import radians
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.markers.goal_marker import GoalMarker
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.clutter.lying_pile import LyingPile
+from manipose_mj.tasks.clutter.pile import Pile
 from manipose_mj.tasks.clutter.pile_cache import PileCache
 from manipose_mj.tasks.clutter.pile_layout import PileConfig
 from manipose_mj.tasks.clutter.pile_scene import PILE_CONTACT_TIME, PILE_TIMESTEP
@@ -26,18 +27,20 @@ from manipose_mj.tasks.scene.resting import pose_on_table, require_graspable
 
 TARGET_NAMES = ("object", "object_second", "object_third")
 _UP = np.array([0.0, 0.0, 1.0])
-_SAMPLES = 20  # of a pile and its place, before a reset gives up
+_PLACEMENTS = 5  # of a pile on the table, before another one is dropped
 _SLEEP_SPEED = 1e-3  # under which an island of touching things falls asleep [m/s]
 _PLACES = 200  # drawn for a goal before the pile is drawn anew
 
 
 @dataclass(frozen=True)
 class ClutterConfig(TaskConfig):
-    """Attributes: pile: how piles are dropped; piles: how many different ones there are of the objects; pile_x: where
+    """Attributes: pile: how piles are dropped; piles: how many different ones there are of the objects, and how many
+    more are dropped where none of those has a target; pile_x: where
     the middle of the pile may be, along x [m]; pile_y: how far from the table's middle line, to
     either side [m]; goal_x, goal_y: the same of goals, on the other side of that line [m];
     room: between a goal and everything else, for the hand [m]; targets: least and largest number;
-    min_free: grasps a target must have that are free in the pile and clear of the table at the goal;
+    moved: how many others may have to be set aside before a target can be taken; min_free: grasps a target must have
+    then, with which the arm can also set it down at its goal, and those others to be set aside by;
     max_turn: of a target's vertical between pile and goal [rad]."""
 
     horizon: float = 90.0
@@ -49,21 +52,16 @@ class ClutterConfig(TaskConfig):
     goal_y: tuple[float, float] = (0.10, 0.42)
     room: float = 0.05
     targets: tuple[int, int] = (1, 1)
-    min_free: int = 2
+    moved: int = 0
+    min_free: int = 6
     max_turn: float = radians(100)
 
 
 class Clutter(ManipulationTask):
     """A pile and goals beside it. A subclass says which objects of a pile may be the targets.
 
-    Physics as in the other tasks, but in steps half as long, with contacts twice as stiff; and friction
-    is held by a stiffer constraint instead of the no-slip solver, for speed.
-
-    Attributes:
-      buried: Whether others may have to be moved before the target can be taken.
+    Physics as in the other tasks, but in steps half as long, with contacts twice as stiff.
     """
-
-    buried = False
 
     def __init__(
         self, assets: tuple[Asset, ...], config: ClutterConfig, env_config: EnvConfig
@@ -128,15 +126,21 @@ class Clutter(ManipulationTask):
     def sample(
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
-        for _ in range(_SAMPLES):
-            lying = self._sample_pile(rng)
-            targets = self.choose_targets(rng, lying, preview)
-            named = spec.object is None or any(lying.name(t) == spec.object for t in targets)
-            goals = self._sample_goals(lying, targets, rng) if targets and named else None
-            if goals is not None:
-                return self._start(lying, targets, goals)
+        count = self.task_config.piles
+        for number in (*rng.permutation(count).tolist(), *range(count, 2 * count)):
+            try:
+                pile = self._cache.pile(number)
+            except NoStartError:
+                continue
+            for _ in range(_PLACEMENTS):
+                lying = self._lying(pile, rng)
+                targets = self.choose_targets(rng, lying, preview)
+                named = spec.object is None or any(lying.name(t) == spec.object for t in targets)
+                goals = self._sample_goals(lying, targets, rng) if targets and named else None
+                if goals is not None:
+                    return self._start(lying, targets, goals)
         raise NoStartError(
-            f"{type(self).__name__}: none of {self.task_config.piles} piles of these objects has a "
+            f"{type(self).__name__}: none of {2 * count} piles of these objects has a "
             f"target as the task wants it{f', {spec.object!r}' if spec.object else ''}; "
             "take more objects, or smaller ones"
         )
@@ -161,10 +165,9 @@ class Clutter(ManipulationTask):
             fixtures={f"goal_{name}": pose for name, pose in requested.items()},
         )
 
-    def _sample_pile(self, rng: np.random.RandomState) -> LyingPile:
+    def _lying(self, pile: Pile, rng: np.random.RandomState) -> LyingPile:
         """A pile on the table, somewhere and turned somehow."""
         config = self.task_config
-        pile = self._cache.pile(int(rng.randint(config.piles)))
         side = float(rng.choice([-1.0, 1.0]))
         middle = np.array([rng.uniform(*config.pile_x), side * rng.uniform(*config.pile_y)])
         turn = rotation_about(_UP, rng.uniform(-np.pi, np.pi))
@@ -183,6 +186,7 @@ class Clutter(ManipulationTask):
         goals = []
         for target in targets:
             asset = lying.assets[target]
+            usable = self._usable(lying, target)
             stable = int(rng.choice(self._goal_rests(lying, target)))
             for _ in range(_PLACES):
                 xy = np.array(
@@ -192,29 +196,25 @@ class Clutter(ManipulationTask):
                     ]
                 )
                 gaps = [np.linalg.norm(xy - at) - reach for at, reach in taken]
-                if min(gaps) > _reach(asset) + config.room:
+                if min(gaps) <= _reach(asset) + config.room:
+                    continue
+                yaw = rng.uniform(-np.pi, np.pi)
+                goal = pose_on_table(asset, stable, xy, yaw) @ asset.label.pose
+                if lying.usable_to(target, usable, goal, stable).sum() >= config.min_free:
                     break
             else:
                 return None
             taken.append((xy, _reach(asset)))
-            yaw = rng.uniform(-np.pi, np.pi)
-            goals.append(pose_on_table(asset, stable, xy, yaw) @ asset.label.pose)
+            goals.append(goal)
         return tuple(goals)
 
     def _goal_rests(self, lying: LyingPile, target: int) -> list[int]:
-        """Stable poses that one grasp may bring the target to; empty if there is none.
-
-        Where something lies on it, or may have to be moved out of the way, its free grasps are not
-        known yet: all that hold count.
-        """
-        pile, asset = lying.pile, lying.assets[target]
+        """Stable poses that one grasp may bring the target to once nothing lies on it; empty if there is none."""
+        asset = lying.assets[target]
         assert asset.grasps is not None
-        held = asset.grasps.held
-        free = pile.free[target, :held]
-        if self.buried or not pile.uncovered[target]:
-            free = np.ones(held, bool)
-        shared = (free[:, None] & asset.grasps.clear[:held]).sum(axis=0)
-        up = pile.poses[target][2, :3]
+        usable = np.asarray(self._usable(lying, target).any(axis=1))
+        shared = (usable[:, None] & asset.grasps.clear).sum(axis=0)
+        up = lying.pile.poses[target][2, :3]
         turns = [
             float(np.arccos(np.clip(rest.rotation[2] @ up, -1.0, 1.0)))
             for rest in asset.stable_poses
@@ -225,8 +225,11 @@ class Clutter(ManipulationTask):
             if shared[k] >= self.task_config.min_free and turn <= self.task_config.max_turn
         ]
 
+    def _usable(self, lying: LyingPile, target: int) -> Bool[np.ndarray, "g 2"]:
+        return lying.usable(target, self.task_config.min_free, self.task_config.moved)
+
     def possible_targets(self, lying: LyingPile) -> list[int]:
-        """The objects of a pile that have a goal pose that one grasp may bring them to."""
+        """The objects of a pile that one grasp may bring to a goal pose, once others are set aside."""
         return [k for k in range(len(lying.assets)) if self._goal_rests(lying, k)]
 
 
