@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.simulation_state import read_simulation
 from manipose_mj.tasks.core.snapshot import MODEL_FIELDS
+from manipose_mj.tasks.core.start import EpisodeStart
 from manipose_mj.tasks.goals import Goal
 from manipose_mj.tasks.observations.pose_observables import MAX_TURNS
 from manipose_mj.tasks.observations.sensor_config import PoseNoise
@@ -30,6 +31,8 @@ from manipose_mj.tasks.observations.sensors import parse_modes
 from manipose_mj.tasks.scene.indices import FIRST, NOBODY, SceneShapes, find_indices, shapes_of
 
 OBSERVED = ("state", "pose")  # modes
+# Makes other starts of an environment that was reset to one; how many there are is the caller's business.
+Vary = Callable[[TaskEnvironment, EpisodeStart], Iterable[EpisodeStart]]
 _CONSTANT = ("pose/symmetry/", "pose/symmetry_count/", "pose/axial/", "pose/counts/")
 
 
@@ -41,12 +44,16 @@ class _Names:
     parts: dict[str, str]
 
 
-def draw_pool(config: EnvConfig, episodes: Sequence[int | EpisodeSpec]) -> StartPool:
+def draw_pool(
+    config: EnvConfig, episodes: Sequence[int | EpisodeSpec], vary: Vary | None = None
+) -> StartPool:
     """The starts of these episodes, as `suite.make(config)` begins them.
 
     Args:
       config: Of the task.
       episodes: Their seeds, or what they are, with seeds; each seed once.
+      vary: Gives the starts to take instead of each episode's own; all of them have its seed. They state every field
+        of the model that any of them changes.
 
     Raises:
       InputError: A mode cannot be batched, or the task cannot use the objects.
@@ -59,7 +66,7 @@ def draw_pool(config: EnvConfig, episodes: Sequence[int | EpisodeSpec]) -> Start
     assert isinstance(environment, TaskEnvironment)
     drawn = _Drawing(environment, config)
     for spec in specs:
-        drawn.add(spec)
+        drawn.add(spec, vary)
     environment.close()
     return drawn.pool()
 
@@ -87,7 +94,7 @@ class _Drawing:
         self._xml: tuple[str, dict[str, bytes]] = ("", {})
         self._layout: Layout | None = None
 
-    def add(self, spec: EpisodeSpec) -> None:
+    def add(self, spec: EpisodeSpec, vary: Vary | None = None) -> None:
         environment, seed = self._environment, spec.seed
         assert seed is not None, "an episode of a pool has a seed"
         observation = environment.reset(spec).observation
@@ -95,13 +102,24 @@ class _Drawing:
         names = _Names(task.observed_objects, _part_slots(task.goals))
         self._widen(names, observation)
         scene = self._scene_of(environment)
-        model = physics.model.ptr
+        if vary is None:
+            self._keep(seed, scene, observation)
+            return
+        assert task.start is not None
+        for other in vary(environment, task.start):
+            with physics.reset_context():
+                task.write(physics, other)
+            self._keep(seed, scene, observation)
+
+    def _keep(self, seed: int, scene: int, observation: Mapping[str, Any]) -> None:
+        """The start at which the environment's simulation is."""
+        model = self._environment.physics.model.ptr
         changed = {
             name: np.array(getattr(model, name))
             for name, compiled in self._compiled[scene].items()
             if not np.array_equal(getattr(model, name), compiled)
         }
-        start = _start_of(environment, seed, scene, changed, self._slots(), observation)
+        start = _start_of(self._environment, seed, scene, changed, self._slots(), observation)
         self._starts.append(start)
 
     def pool(self) -> StartPool:

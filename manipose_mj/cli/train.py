@@ -34,6 +34,7 @@ def train_ppo(
     engine: Literal["auto", "c", "warp"] = "auto",
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    policy: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> int:
     """Learn to open or shut a drawer or door, on the furniture for training, by proximal policy optimisation.
 
@@ -52,6 +53,7 @@ def train_ppo(
       engine: warp, on a GPU; c, on the CPU, far slower; auto, the former where it runs.
       objects: Furniture instead of the built-in pieces for training: names, asset folders, or folders of them.
       pool: File with the starts: read if it is there, otherwise written.
+      policy: The policy.npz of a training, from which this one goes on.
     """
     one_thread_per_process()
     compile_at_once_on_gpus()
@@ -77,6 +79,7 @@ def train_ppo(
         episode=episode,
         engine=available_engine(engine),
         objects=objects or None,
+        policy=policy,
     )
     out = out or Path("ppo") / task.rpartition("/")[2]
     with output.working_on("drawing starts"):

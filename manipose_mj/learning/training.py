@@ -9,7 +9,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from manipose_mj.batch.drawing import draw_pool
@@ -25,6 +27,8 @@ from manipose_mj.tasks.core.config import EnvConfig, Objects
 
 POLICY_FILE, CURVE_FILE = "policy.npz", "curve.json"
 _AT_ONCE = 4  # updates between looks at the clock
+# Of a training that goes on: of actions at first, and features that the normalisation has seen.
+_SPREAD, _SEEN = 0.35, 1e6
 Row = dict[str, float]
 
 
@@ -44,6 +48,7 @@ class TrainingConfig:
       episode: Length of an episode [s], shorter than the task's.
       engine: Of the physics.
       objects: Furniture; None: the built-in pieces for training.
+      policy: A trained one to go on from, whose actor and normalisation are kept; None: from nothing.
       ppo: How to learn.
     """
 
@@ -58,6 +63,7 @@ class TrainingConfig:
     episode: float = 12.0
     engine: EngineName = "auto"
     objects: Objects | None = None
+    policy: Path | None = None
     ppo: PpoConfig = PpoConfig()
 
 
@@ -92,11 +98,8 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
             f"{config.task}: what is trained opens or shuts one drawer or door; choose one of the tasks "
             "articulated/open_* and close_*"
         )
-    # Episodes are shorter than the task's, and the friction solver for the last micrometres is left out, which costs
-    # most of the time on a GPU.
+    # Episodes are shorter than the task's.
     steps = round(config.episode / (layout.timestep * layout.substeps))
-    for scene in pool.scenes:
-        scene.opt.noslip_iterations = 0
     return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
 
 
@@ -115,15 +118,18 @@ def train(
       on_progress: Called with each new row of the curve.
 
     Raises:
-      InputError: The engine cannot run here, or the updates need more worlds.
+      InputError: The engine cannot run here, the updates need more worlds, or the policy to go on from is none.
     """
     ppo = config.ppo
+    before = None if config.policy is None else Trained.load(config.policy)
     if config.worlds * ppo.steps < ppo.minibatches:
         raise InputError(f"{config.worlds} worlds are too few for {ppo.minibatches} minibatches")
     started = time.monotonic()
     worlds = from_pool(pool, config.worlds, available_engine(config.engine))
     learning = Ppo(worlds, handle_frame.features, handle_frame.command, handle_frame.ACTIONS, ppo)
     learner = learning.begin(jax.random.key(config.seed))
+    if before is not None:
+        learner = _going_on(learner, before)
     rows: list[Row] = []
     updates, actions = 0, config.worlds * ppo.steps
     trained = _trained(config, pool, learner)
@@ -145,6 +151,18 @@ def train(
             break
     worlds.close()
     return trained
+
+
+def _going_on(learner: Learner, before: Trained) -> Learner:
+    """A learner with the actor of a training; the critic, which its file does not hold, knows nothing yet."""
+    spread = jnp.full_like(learner.network.log_spread, jnp.log(_SPREAD))
+    network = eqx.tree_at(
+        lambda net: (net.actor, net.log_spread), learner.network, (before.network.actor, spread)
+    )
+    count = jnp.asarray(_SEEN, jnp.float32)
+    return learner._replace(
+        network=network, normaliser=eqx.tree_at(lambda n: n.count, before.normaliser, count)
+    )
 
 
 def _trained(config: TrainingConfig, pool: StartPool, learner: Learner) -> Trained:
@@ -170,6 +188,7 @@ def _write(out: Path, trained: Trained, config: TrainingConfig, rows: list[Row])
     out.mkdir(parents=True, exist_ok=True)
     trained.save(out / POLICY_FILE)
     said: dict[str, Any] = asdict(config)
+    said["policy"] = None if config.policy is None else str(config.policy)
     said["objects"] = None if config.objects is None else [str(each) for each in config.objects]
     with new_cache_file(out / CURVE_FILE) as scratch:
         scratch.write_text(json.dumps({"config": said, "rows": rows}, indent=1))

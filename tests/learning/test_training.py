@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 
+import equinox as eqx
+import jax
 import pytest
 
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
+from manipose_mj.learning.trained import Trained
 from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, training_pool
 
 TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
 
 
-def test_starts_are_kept_in_a_file_with_shorter_episodes_and_no_slip_solver(tmp_path):
+def test_starts_are_kept_in_a_file_with_shorter_episodes(tmp_path):
     config = TrainingConfig(TASK, starts=2, objects=PIECES, episode=4.0)
     pool = training_pool(config, tmp_path / "starts")
     assert pool.layout.horizon == 200
-    assert {scene.opt.noslip_iterations for scene in pool.scenes} == {0}
     again = training_pool(config, tmp_path / "starts")
     assert again.seeds == pool.seeds == (0, 1)
     other = TrainingConfig("articulated/close_middle_drawer", starts=2, objects=PIECES)
@@ -34,6 +36,9 @@ def test_tasks_without_a_handle_are_refused():
 def test_bad_numbers_end_in_one_line(capsys):
     assert main(["train", "ppo", TASK, "--worlds", "0"]) == EXIT_INPUT
     assert "--worlds is 0" in capsys.readouterr().err
+    missing = ["--engine", "c", "--starts", "1", "--objects", PIECES[0], "--policy", "nowhere.npz"]
+    assert main(["train", "ppo", TASK, *missing]) == EXIT_INPUT
+    assert "nowhere.npz: no trained policy" in capsys.readouterr().err
     assert main(["train", "ppo", "articulated/open_midle_drawer"]) == EXIT_INPUT
     assert "open_middle_drawer" in capsys.readouterr().err
 
@@ -57,6 +62,14 @@ def test_a_training_leaves_a_policy_that_evaluate_plays(tmp_path, capsys):
     assert main([*words, "--objects", *PIECES, "--out", str(out)]) == 0
     rows = json.loads((out / "curve.json").read_text())["rows"]
     assert rows[-1]["actions"] == 4 * 16
+    on = ["--policy", str(out / POLICY_FILE), "--out", str(tmp_path / "on")]
+    assert main([*words, "--objects", *PIECES, *on]) == 0
+    actor, before = (
+        jax.tree.leaves(eqx.filter(Trained.load(folder / POLICY_FILE).network.actor, eqx.is_array))
+        for folder in (tmp_path / "on", out)
+    )
+    away = [float(abs(a - b).max()) for a, b in zip(actor, before, strict=True)]
+    assert 0 < max(away) < 0.05  # another training's weights differ by 0.1 and more
     words = ["evaluate", TASK, "--objects", PIECES[0], "--episodes", "2", "--out", str(results)]
     words += ["--policy", "manipose_mj.learning:TrainedPolicy", "--hz", "5"]
     words += ["--policy-args", json.dumps({"path": str(out / POLICY_FILE)})]
