@@ -182,7 +182,7 @@ def _key(mesh: trimesh.Trimesh, settings: ConvexSettings) -> str:
     digest.update(np.ascontiguousarray(mesh.vertices, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(mesh.faces, dtype="<i8").tobytes())
     digest.update(repr(sorted(asdict(settings).items())).encode())
-    digest.update(f"coacd {version('coacd')}, reduction 2".encode())
+    digest.update(f"coacd {version('coacd')}, reduction 3".encode())
     return digest.hexdigest()
 
 

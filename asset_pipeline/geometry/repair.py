@@ -12,6 +12,8 @@ NEARLY_CLOSED = 0.98
 # A vertex as far from its nearest neighbour as this many times the edges around: on 32 scans as
 # published the ratio is below 1.2.
 SPIKE = 1.7
+# Of the volume that bodies claim together, the share above which they reach into one another.
+OVERLAP = 1e-9
 # A face that hangs on one edge, and is longer than this many times the median edge, spans what it should not.
 FLAP = 5.0
 
@@ -19,11 +21,12 @@ FLAP = 5.0
 def closed(mesh: trimesh.Trimesh, tolerance: float = 0.0) -> trimesh.Trimesh | None:
     """The mesh as a closed, oriented surface; None where that takes more than stitching.
 
-    Seams are welded, edges that four faces share are split (scans touch themselves), and small
-    holes are filled; the faces that remain deviate by at most about `tolerance`.
+    Seams are welded, edges that four faces share are split (scans touch themselves), small
+    holes are filled, and bodies that reach into one another become one; the faces that remain deviate
+    by at most about `tolerance`.
 
     Args:
-      mesh: A scan, its vertices split along texture seams.
+      mesh: A scan, its vertices split along texture seams; or a drawn mesh of several closed bodies.
       tolerance: How far simplification may move the surface [m]; 0 keeps all faces.
     """
     welded = weld(mesh)
@@ -34,6 +37,7 @@ def closed(mesh: trimesh.Trimesh, tolerance: float = 0.0) -> trimesh.Trimesh | N
         solid = _manifold(welded)
     if solid is None or solid.volume() <= 0:
         return None
+    solid = _united(solid)
     if tolerance:
         solid = solid.simplify(tolerance)
     data = solid.to_mesh64()
@@ -140,8 +144,48 @@ def weld(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 def _manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold | None:
     data = manifold3d.Mesh64(
-        np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.uint64)
+        np.array(mesh.vertices, np.float64, order="C"),
+        np.array(mesh.faces, np.uint64, order="C"),
     )
     data.merge()
     solid = manifold3d.Manifold(data)
     return None if solid.status() != manifold3d.Error.NoError or solid.is_empty() else solid
+
+
+def _united(solid: manifold3d.Manifold) -> manifold3d.Manifold:
+    """The same volume with no surface inside it; as it is where its bodies keep clear of one another.
+
+    Surfaces that enclose a negative volume are the cavities of the smallest bodies around them.
+    """
+    surfaces = sorted(solid.decompose(), key=lambda surface: surface.volume())
+    bodies = [surface for surface in surfaces if surface.volume() > 0]
+    if len(bodies) < 2:
+        return solid
+    for cavity in (_turned(surface) for surface in surfaces if surface.volume() <= 0):
+        around = next((i for i, body in enumerate(bodies) if _spans(body, cavity)), None)
+        if cavity is None or around is None:
+            return solid
+        bodies[around] -= cavity
+    united = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
+    if (
+        united.status() != manifold3d.Error.NoError
+        or united.volume() > (1 - OVERLAP) * solid.volume()
+    ):
+        return solid
+    return united
+
+
+def _turned(surface: manifold3d.Manifold) -> manifold3d.Manifold | None:
+    """Inside out."""
+    data = surface.to_mesh64()
+    return _manifold(
+        trimesh.Trimesh(data.vert_properties[:, :3], data.tri_verts[:, ::-1], process=False)
+    )
+
+
+def _spans(body: manifold3d.Manifold, other: manifold3d.Manifold | None) -> bool:
+    if other is None:
+        return False
+    low, high = np.reshape(body.bounding_box(), (2, 3))
+    other_low, other_high = np.reshape(other.bounding_box(), (2, 3))
+    return bool((low <= other_low).all() and (other_high <= high).all())
