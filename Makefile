@@ -4,6 +4,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
+# Tests start many processes: without byte code on the disk each would compile all modules again.
+export PYTHONDONTWRITEBYTECODE :=
+
 # Workers take tests from one another when they run out of their own.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 
