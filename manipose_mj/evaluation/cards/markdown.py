@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from manipose_mj.evaluation import protocol
+
 OWN_CODE = "this repository"
 
 
@@ -29,6 +31,11 @@ def method_text(method: Mapping[str, Any]) -> str:
     made = [f"{name.replace('_', ' ')} {value}" for name, value in wrong.items()]
     grasps = f", grasps by {method['grasps']}" if method.get("grasps") else ""
     return _who(method) + grasps + (f"; errors made on purpose: {', '.join(made)}" if made else "")
+
+
+def _coverage(run: Mapping[str, Any]) -> str:
+    """How many of the protocol's tasks a run is of, such as `1 of 34`."""
+    return f"{len(run['tasks'])} of {len(protocol.load(run['protocol']).tasks)}"
 
 
 def _who(method: Mapping[str, Any]) -> str:
@@ -57,6 +64,7 @@ def _run_lines(run: Mapping[str, Any]) -> list[str]:
     return [
         f"## Protocol {run['protocol']}, {seeds}",
         "",
+        f"{_coverage(run)} tasks of the protocol. "
         f"Mean over tasks: {run['mean_success_at_end']:.1%} at end, {run['mean_success_once']:.1%} once.",
         "",
         "| task | n | at end | Wilson 95 % | once | Wilson 95 % | failures |",

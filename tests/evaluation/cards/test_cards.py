@@ -83,6 +83,10 @@ def test_a_card_states_both_rates_with_intervals_protocol_and_hash(card, results
     assert "true poses" in text and f"`{TASK}` | 6" in text and "https://example.org/a" in text
 
 
+def test_a_card_says_how_many_of_the_tasks_it_covers(card):
+    assert "\n2 of 34 tasks of the protocol. Mean over tasks: " in (card / "card.md").read_text()
+
+
 def test_an_untouched_card_passes(card, capsys):
     assert check_card(card) == 12
     assert main(["card", "--check", str(card), str(card)]) == 0
