@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.policy_settings import tells_true_poses
 
 OWN_CODE = "this repository"
 
@@ -43,7 +44,8 @@ def _who(method: Mapping[str, Any]) -> str:
     if policy:
         name = policy.get("name", "?") if isinstance(policy, Mapping) else policy
         seen = policy.get("obs_mode") if isinstance(policy, Mapping) else None
-        return f"policy `{name}`" + (f", observations `{seen}`" if seen else "")
+        told = ", true poses among them" if seen and tells_true_poses(seen) else ""
+        return f"policy `{name}`" + (f", observations `{seen}`{told}" if seen else "")
     if method.get("pose") != "estimated":
         return "the baseline planner with true poses"
     estimator = method.get("estimator")
