@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-
 ROOT = Path(__file__).parents[2]
 LEADERBOARD = ROOT / "leaderboard"
 # Read, not imported: the site is built where the package is not installed.

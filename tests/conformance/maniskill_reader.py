@@ -22,14 +22,11 @@ def shapes(value, name=""):
 
 data = ManiSkillTrajectoryDataset(sys.argv[1], success_only=True, device=torch.device("cpu"))
 batch = next(iter(torch.utils.data.DataLoader(data, batch_size=8)))
-print(
-    json.dumps(
-        {
-            "frames": len(data),
-            "env_id": data.env_id,
-            "actions": data.actions.double().sum(dim=0).tolist(),
-            "observations": {k: v for k, v in shapes(batch["obs"]).items()},
-            "batch": shapes({k: v for k, v in batch.items() if k != "obs"}),
-        }
-    )
-)
+said = {
+    "frames": len(data),
+    "env_id": data.env_id,
+    "actions": data.actions.double().sum(dim=0).tolist(),
+    "observations": shapes(batch["obs"]),
+    "batch": shapes({name: each for name, each in batch.items() if name != "obs"}),
+}
+sys.stdout.write(json.dumps(said) + "\n")

@@ -1,6 +1,6 @@
 """Distances of poses equal those of bop_toolkit's functions, where BOP_TOOLKIT names its folder.
 
-    BOP_TOOLKIT=bop_toolkit python -m pytest tests/conformance/test_bop_toolkit.py
+BOP_TOOLKIT=bop_toolkit python -m pytest tests/conformance/test_bop_toolkit.py
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ def toolkit():
         pytest.skip("BOP_TOOLKIT names no folder of bop_toolkit")
     sys.path.insert(0, folder)
     try:
-        from bop_toolkit_lib import misc  # first: pose_error imports it, and it imports pose_error
-        from bop_toolkit_lib import pose_error
+        from bop_toolkit_lib import (
+            misc,  # first: pose_error imports it, and it imports pose_error
+            pose_error,
+        )
     finally:
         sys.path.remove(folder)
     return misc, pose_error

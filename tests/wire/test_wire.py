@@ -73,9 +73,9 @@ def test_nobody_there_is_an_input_error():
 
 @pytest.mark.parametrize("metadata", [[1], b"\xc1", "hello"])
 def test_a_server_without_metadata_is_of_something_else(metadata):
-    with answering(lambda q: q, metadata=metadata) as address:
-        with pytest.raises(InputError, match="no server answers there"):
-            Client(address).open()
+    serving = answering(lambda q: q, metadata=metadata)
+    with serving as address, pytest.raises(InputError, match="no server answers there"):
+        Client(address).open()
 
 
 def test_a_server_that_hangs_up_is_lost():
