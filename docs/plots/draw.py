@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 from concept_figures import protocol, symmetry
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
 from plot_style import (
     BLUE,
     FAINT,
@@ -65,7 +67,6 @@ def protocol_v1() -> Figure:
     figure = new_figure(7.2, 4.2)
     axes = axes_of(figure, grid="x")
     for poses, shift, colour in (("true", 0.19, TEAL), ("estimated", -0.19, ORANGE)):
-        axes.barh([], [], color=colour, label=f"{poses} poses")
         for y, starts in enumerate(reversed(FAMILIES.values())):
             own = [r for r in table if r["task"].startswith(starts) and r["poses"] == poses]
             if not own:
@@ -79,7 +80,15 @@ def protocol_v1() -> Figure:
     axes.set_ylim(-0.7, len(FAMILIES) - 0.3)
     axes.set_xlabel("success at end [%], line: Wilson 95 % interval")
     axes.legend(
-        frameon=False, labelcolor=INK, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+        handles=[
+            Patch(color=TEAL, label="true poses"),
+            Patch(color=ORANGE, label="estimated poses"),
+        ],
+        frameon=False,
+        labelcolor=INK,
+        ncols=2,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
     )
     return figure
 
@@ -210,11 +219,12 @@ def unseen_categories() -> Figure:
     for row in rows("unseen_categories"):
         x, y = seen[row["category"]], float(row["rotation_median_deg"])
         axes.plot(x, y, "o", color=TYPE_COLOURS[row["type"]])
-        beside = row["category"] in {"drinkbox", "remote", "chips can", "pear"}
+        beside = row["category"] in {"drinkbox", "remote", "chips can", "pear", "toothbrush"}
+        below = row["category"] in {"helmet", "trash bin"}
         axes.annotate(
             row["category"],
             (x, y),
-            xytext=(-5 if beside else 5, 3),
+            xytext=(-5 if beside else 5, -9 if below else 3),
             ha="right" if beside else "left",
             textcoords="offset points",
             color=INK,
@@ -224,8 +234,10 @@ def unseen_categories() -> Figure:
     axes.set_yscale("log")
     axes.set_xlim(0.12, 9)
     axes.set_ylim(0.12, 260)
+    axes.set_xticks([0.2, 0.5, 1, 2, 5])
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("median error with the category in training [deg]")
     axes.set_ylabel("median error without it [deg]")
     for name, colour in TYPE_COLOURS.items():
