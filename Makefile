@@ -10,7 +10,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # Workers take tests from one another when they run out of their own.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 
-.PHONY: demo test test-full test-all lint bench conformance conformance-lerobot docs release-check clean
+.PHONY: demo test test-full test-all lint bench conformance conformance-lerobot conformance-maniskill docs release-check clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/manipose demo --out demo_report
@@ -48,6 +48,13 @@ conformance-lerobot:
 	$(LEROBOT_VENV)/bin/python -m pip --disable-pip-version-check install --quiet "lerobot[dataset,training,evaluation]>=0.6.1,<0.7" . ./plugins/lerobot_env_manipose
 	plugins/lerobot_env_manipose/conformance.sh $(LEROBOT_VENV)/bin conformance_lerobot
 
+# ManiSkill's own loader in an environment of its own reads demonstrations that were replayed.
+MANISKILL_VENV ?= .venv-maniskill
+conformance-maniskill: $(VENV)/.dev
+	$(PYTHON) -m venv $(MANISKILL_VENV)
+	$(MANISKILL_VENV)/bin/python -m pip --disable-pip-version-check install --quiet "mani_skill>=3.0.1,<3.1"
+	MANISKILL_PYTHON=$(MANISKILL_VENV)/bin/python $(BIN)/python -m pytest tests/conformance/test_maniskill.py
+
 # The site, into site/: index.html opens without a server. The variable keeps Material's notice about MkDocs 2 out.
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean --quiet
@@ -77,4 +84,4 @@ $(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(LEROBOT_VENV) conformance_lerobot demo_report site
+	rm -rf $(VENV) $(LEROBOT_VENV) $(MANISKILL_VENV) conformance_lerobot demo_report site

@@ -6,7 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-LEADERBOARD = Path(__file__).parents[2] / "leaderboard"
+ROOT = Path(__file__).parents[2]
+LEADERBOARD = ROOT / "leaderboard"
+# Read, not imported: the site is built where the package is not installed.
+PROTOCOLS = ROOT / "manipose_mj" / "evaluation" / "protocol"
 PAGE, PLACE = "results/leaderboard.md", "<!-- cards -->"
 
 
@@ -34,9 +37,11 @@ def tables(folder: Path = LEADERBOARD) -> str:
 def _row(card: dict[str, Any], run: dict[str, Any]) -> str:
     seeds = "frozen" if run["resample"] is None else f"resampled from {run['resample']}"
     episodes = sum(task["n"] for task in run["tasks"].values())
+    protocol = json.loads((PROTOCOLS / f"{run['protocol']}.json").read_text(encoding="utf-8"))
+    covered = f"{len(run['tasks'])} of {len(protocol['tasks'])}"
     url = card["code_url"]
     name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
     return (
-        f"| {name} | {run['protocol']}, {seeds} | {len(run['tasks'])} | {episodes} | "
+        f"| {name} | {run['protocol']}, {seeds} | {covered} | {episodes} | "
         f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {card['training_data']} |"
     )

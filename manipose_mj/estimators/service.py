@@ -6,7 +6,7 @@ import atexit
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.errors import ServerLostError
 from manipose_mj.estimators.answer import EstimatorFailedError, checked_answer
 from manipose_mj.estimators.observation import Observation
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
@@ -26,7 +26,6 @@ class RemoteEstimator:
 
     Attributes:
       address: Such as `ws://localhost:8000`.
-      metadata: What the server said of itself.
     """
 
     def __init__(self, address: str) -> None:
@@ -36,33 +35,31 @@ class RemoteEstimator:
           InputError: Nobody answers there.
         """
         self.address = address
-        self._client: Client | None = Client(address)
-        self.metadata = self._client.metadata
+        self._client = Client(address, "estimator server")
+        self._client.open()
         atexit.register(self.close)
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What the server said of itself."""
+        return self._client.metadata
 
     def close(self) -> None:
         """Hangs up; the next question connects again."""
-        if self._client is not None:
-            self._client.close()
-        self._client = None
+        self._client.close()
 
-    def estimate(self, observation: Observation, /) -> Mapping[str, Any]:
+    def estimate(self, observation: Observation, /) -> Any:
         """The server's answer; connects again after the server has failed on a question.
 
         Raises:
           ServerLostError: It is there no more.
           EstimatorFailedError: It failed on this question.
         """
-        if self._client is None:
-            try:
-                self._client = Client(self.address)
-            except InputError as error:
-                raise ServerLostError(str(error)) from None
         try:
             return self._client.ask(observation)
         except RemoteFailureError as error:
             self.close()
-            raise EstimatorFailedError(str(error)) from None
+            raise EstimatorFailedError(f"{self.address}: {error}") from None
 
 
 class EstimatorService:

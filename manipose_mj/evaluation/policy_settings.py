@@ -70,11 +70,8 @@ class PolicySettings:
 
     @property
     def sees_true_poses(self) -> bool:
-        """Whether its observations tell what only a simulator knows: poses, or which pixel is which object."""
-        parts = self.obs_mode.split("+")
-        return any(
-            part.split("/")[0] in _TRUE_POSES or part.startswith("pointcloud/") for part in parts
-        )
+        """Whether its observations tell what only a simulator knows."""
+        return tells_true_poses(self.obs_mode)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -92,3 +89,11 @@ class PolicySettings:
         if self.execute is not None:
             words += ["--execute", str(self.execute)]
         return [*words, "--obs-format", self.obs_format, "--stop", self.stop]
+
+
+def tells_true_poses(obs_mode: str) -> bool:
+    """Whether observations of a mode tell what only a simulator knows: poses, or which pixel is which object."""
+    return any(
+        part.split("/")[0] in _TRUE_POSES or part.startswith("pointcloud/")
+        for part in obs_mode.split("+")
+    )

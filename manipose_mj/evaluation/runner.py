@@ -342,8 +342,11 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
-    except (InputError, OSError, MemoryError, ServerLostError):
+    except (InputError, OSError, MemoryError):
         raise
+    except ServerLostError as error:
+        advice = "finished episodes are kept: start it again and repeat with --resume"
+        raise ServerLostError(f"{error}; {advice}") from None
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)
         write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))

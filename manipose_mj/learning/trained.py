@@ -7,6 +7,7 @@ manipose evaluate articulated/open_middle_drawer --policy manipose_mj.learning:T
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import zipfile
 from collections.abc import Mapping
@@ -117,8 +118,13 @@ class TrainedPolicy:
           InputError: There is none, or it is no trained policy.
         """
         own = Path(str(resources.files("manipose_mj.learning"))) / "weights" / f"{path}.npz"
-        self._trained = trained = Trained.load(own if own.is_file() else Path(path))
-        self.metadata = {"trained on": trained.task, "seed": trained.seed}
+        file = own if own.is_file() else Path(path)
+        self._trained = trained = Trained.load(file)
+        self.metadata = {
+            "trained on": trained.task,
+            "seed": trained.seed,
+            "weights sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+        }
         self._act = jax.jit(self.act)
 
     def act(self, observation: Mapping[str, Array]) -> Float[Array, "worlds 7"]:

@@ -12,24 +12,17 @@ All three send a dictionary of metadata first and answer packed observations wit
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
-from websockets.exceptions import ConnectionClosed, InvalidURI, WebSocketException
-from websockets.sync.client import ClientConnection, connect
 
-from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.failures import StageFailure
 from manipose_mj.policies.protocol import ActionSpace
-from manipose_mj.wire.framing import pack, unpack
+from manipose_mj.wire.client import Client, RemoteFailureError
 
 RESET = "manipose_reset"
 Dialect = Literal["openpi", "roboarena", "manipose"]
 _EXTERIOR = "exterior_image_1", "exterior_image_0"
-_OPEN_S = 10.0
-# The first inference of a server may compile for minutes.
-_ANSWER_S = 900.0
 
 
 class RemotePolicy:
@@ -37,16 +30,17 @@ class RemotePolicy:
 
     Attributes:
       address: Such as `"ws://localhost:8000"`.
-      metadata: What the server said of itself; empty before the first connection.
     """
 
     def __init__(self, address: str) -> None:
         self.address = address
-        self.metadata: dict[str, Any] = {}
-        self._connection: ClientConnection | None = None
-        self._stack = ExitStack()
-        self._reached = False
+        self._client = Client(address, "policy server")
         self._session = np.zeros(1, np.int32)
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What the server said of itself; empty before the first connection."""
+        return self._client.metadata
 
     @property
     def dialect(self) -> Dialect:
@@ -62,41 +56,15 @@ class RemotePolicy:
           InputError: Nobody answers, or not as a policy server.
           ServerLostError: Nobody answers any more.
         """
-        if self._connection is not None:
-            return
-        try:
-            # The server may be busy longer than a keep-alive would wait.
-            self._connection = self._stack.enter_context(
-                connect(
-                    self.address,
-                    open_timeout=_OPEN_S,
-                    ping_interval=None,
-                    compression=None,
-                    max_size=None,
-                )
-            )
-            first = self._connection.recv(timeout=_OPEN_S)
-            metadata = unpack(first) if isinstance(first, bytes) else None
-        except (OSError, WebSocketException, InvalidURI, ValueError, EOFError) as error:
-            self.close()
-            raise self._unreachable(str(error) or type(error).__name__) from None
-        if not isinstance(metadata, dict):
-            self.close()
-            raise self._unreachable("its first message is no dictionary of metadata")
-        self.metadata = {_text(name): value for name, value in metadata.items()}
-        self._reached = True
-
-    def _unreachable(self, reason: str) -> Exception:
-        reason = " ".join(reason.split())
-        if self._reached:
-            return ServerLostError(
-                f"{self.address}: the policy server answers no more ({reason}); finished episodes are kept: start "
-                "it again and repeat with --resume"
-            )
-        return InputError(f"{self.address}: no policy server answers there ({reason})")
+        self._client.open()
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
-        """Tell the server of an episode, if it wants to know."""
+        """Tell the server of an episode, if it wants to know.
+
+        Raises:
+          StageFailure: Of the stage `policy`: the server answered with an error.
+          ServerLostError: The connection broke.
+        """
         self.open()
         self._session = np.array([seed % 2**31], np.int32)
         if self.dialect == "openpi":
@@ -115,9 +83,12 @@ class RemotePolicy:
                 "control_mode": action_space.control_mode,
                 "hz": action_space.hz,
             }
-        answer = self._asked(message)
-        if isinstance(answer, str) and (self.dialect == "manipose" or "Traceback" in answer):
-            self._refuse(answer)
+        try:
+            self._client.ask(message)
+        except RemoteFailureError as error:
+            # RoboArena's servers say by text that all went well.
+            if self.dialect == "manipose" or "Traceback" in error.text:
+                self._refuse(error)
 
     def infer(self, obs: Mapping[str, Any]) -> Any:
         """The server's answer.
@@ -133,40 +104,19 @@ class RemotePolicy:
                 message["session_id"] = self._session
         if self.dialect != "openpi":
             message["endpoint"] = "infer"
-        answer = self._asked(message)
-        if isinstance(answer, str):
-            self._refuse(answer)
-        return answer
+        try:
+            return self._client.ask(message)
+        except RemoteFailureError as error:
+            self._refuse(error)
 
     def close(self) -> None:
         """Hang up; the next episode connects again."""
-        self._connection = None
-        self._stack.close()
+        self._client.close()
 
-    def _asked(self, message: dict[str, Any]) -> Any:
-        assert self._connection is not None, "reset comes first"
-        try:
-            self._connection.send(pack(message))
-            answer = self._connection.recv(timeout=_ANSWER_S)
-        except (ConnectionClosed, OSError, EOFError) as error:
-            self.close()
-            raise self._unreachable(str(error) or type(error).__name__) from None
-        if isinstance(answer, str):
-            return answer
-        try:
-            return unpack(answer)
-        except ValueError as error:
-            raise StageFailure("policy", f"the server's answer is {error}") from None
-
-    def _refuse(self, text: str) -> None:
-        """Raises the StageFailure of an error, after which servers hang up."""
+    def _refuse(self, error: RemoteFailureError) -> NoReturn:
+        """Fail the episode; servers hang up after an error."""
         self.close()
-        last = text.strip().splitlines()[-1:] or ["no reason given"]
-        raise StageFailure("policy", f"the server answered with an error: {last[0][:200]}")
+        raise StageFailure("policy", str(error)) from None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return RemotePolicy, (self.address,)
-
-
-def _text(name: Any) -> str:
-    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)

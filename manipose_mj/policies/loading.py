@@ -12,8 +12,7 @@ from typing import Any
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.policies.client import RemotePolicy
 from manipose_mj.policies.protocol import Policy
-
-REMOTE = ("ws://", "wss://")
+from manipose_mj.wire.client import is_address
 
 
 def policy_arguments(text: str | None) -> dict[str, Any]:
@@ -51,7 +50,7 @@ def load_policy(name: str, arguments: str | None = None) -> Policy:
         one at the address, or there are arguments for it.
     """
     keywords = policy_arguments(arguments)
-    if name.startswith(REMOTE):
+    if is_address(name):
         if keywords:
             raise InputError(f"--policy {name}: a server takes no --policy-args; give them to it")
         remote = RemotePolicy(name)

@@ -6,18 +6,28 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
 
-from websockets.exceptions import InvalidHandshake, InvalidURI, WebSocketException
+from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.wire.framing import pack, unpack
 
 SCHEMES = ("ws://", "wss://")
-OPEN_S, ANSWER_S = 10.0, 600.0
+_OPEN_S = 10.0
+# The first answer of a server may wait minutes for a compiler.
+_ANSWER_S = 900.0
 
 
 class RemoteFailureError(RuntimeError):
-    """The method failed on a question and said so; its server may have hung up."""
+    """The method failed on a question; its server may have hung up. The message is one line.
+
+    Attributes:
+      text: What the server sent instead of an answer; empty where it sent bytes that are no message.
+    """
+
+    def __init__(self, message: str, text: str = "") -> None:
+        super().__init__(message)
+        self.text = text
 
 
 def is_address(reference: str) -> bool:
@@ -26,77 +36,101 @@ def is_address(reference: str) -> bool:
 
 
 class Client:
-    """One connection, held until it is closed.
+    """Talks to one server; connects when it is first asked, and again after it was closed.
 
     Attributes:
       address: Such as `ws://localhost:8000`.
-      metadata: What the server said first.
+      kind: Of server, for messages.
+      metadata: What the server said of itself; empty before the first connection.
     """
 
-    def __init__(self, address: str, *, open_s: float = OPEN_S, answer_s: float = ANSWER_S) -> None:
-        """Connects, and waits for the metadata.
+    def __init__(self, address: str, kind: str = "server", *, answer_s: float = _ANSWER_S) -> None:
+        """Does not connect yet.
 
         Args:
           address: Of the server.
-          open_s: How long to wait for a connection and for the metadata [s].
+          kind: Such as `"policy server"`.
           answer_s: How long to wait for an answer [s].
+        """
+        self.address, self.kind, self._answer_s = address, kind, answer_s
+        self.metadata: dict[str, Any] = {}
+        self._connection: ClientConnection | None = None
+        self._stack = ExitStack()
+        self._reached = False
+
+    def open(self) -> None:
+        """Connect and read the metadata; nothing where that was done already.
 
         Raises:
-          InputError: Nobody answers there, or not with a dictionary.
+          InputError: Nobody answers, or not with a dictionary.
+          ServerLostError: Somebody did before.
         """
-        self.address, self._answer_s = address, answer_s
-        self._stack = ExitStack()
-        try:
-            # No pings: a method may be busy for longer than they wait.
-            opening = connect(
-                address, compression=None, max_size=None, open_timeout=open_s, ping_interval=None
-            )
-            self._socket: ClientConnection = self._stack.enter_context(opening)
-        except (OSError, InvalidURI, InvalidHandshake) as error:
-            raise InputError(f"{address}: no server answers ({_line(error)})") from None
-        try:
-            self.metadata = self._received(open_s)
-        except (ServerLostError, RemoteFailureError) as error:
-            self.close()
-            raise InputError(str(error)) from None
+        self._opened()
 
-    def ask(self, question: Mapping[str, Any]) -> dict[str, Any]:
+    def ask(self, question: Mapping[str, Any]) -> Any:
         """The server's answer.
 
         Raises:
-          ServerLostError: The connection broke, or what came is no answer.
-          RemoteFailureError: The server reports an error of its own, by text.
+          InputError: Nobody answers, or not with a dictionary.
+          ServerLostError: The connection broke, or nothing came in time.
+          RemoteFailureError: The server reports an error by text, or what came is no message. Close after it:
+            most servers hang up.
         """
+        connection = self._opened()
         try:
-            self._socket.send(pack(question))
-        except (OSError, WebSocketException) as error:
-            raise ServerLostError(f"{self.address}: connection lost ({_line(error)})") from None
-        return self._received(self._answer_s)
+            connection.send(pack(question))
+            answer = connection.recv(timeout=self._answer_s)
+        except TimeoutError:
+            raise self._gone(f"no answer within {self._answer_s:g} s") from None
+        except (OSError, EOFError, WebSocketException) as error:
+            raise self._gone(f"connection lost: {_reason(error)}") from None
+        if isinstance(answer, str):  # how openpi's servers report an exception
+            last = (answer.strip().splitlines() or ["no reason given"])[-1]
+            raise RemoteFailureError(f"the server failed: {last[:200]}", answer)
+        try:
+            return unpack(answer)
+        except ValueError as error:
+            raise RemoteFailureError(f"the server's answer is {error}") from None
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Hang up; the next question connects again."""
+        self._connection = None
         self._stack.close()
 
-    def _received(self, seconds: float) -> dict[str, Any]:
+    def _opened(self) -> ClientConnection:
+        if self._connection is not None:
+            return self._connection
         try:
-            content = self._socket.recv(timeout=seconds)
-        except TimeoutError:
-            raise ServerLostError(f"{self.address}: no answer within {seconds:g} s") from None
-        except (OSError, WebSocketException) as error:
-            raise ServerLostError(f"{self.address}: connection lost ({_line(error)})") from None
-        if isinstance(content, str):  # how openpi's servers report an exception
-            last = (content.strip().splitlines() or ["nothing"])[-1]
-            raise RemoteFailureError(f"{self.address}: the server failed: {last[:300]}")
-        try:
-            message = unpack(content)
-        except ValueError as error:
-            raise ServerLostError(f"{self.address}: {error}") from None
-        if not isinstance(message, dict):
-            raise ServerLostError(
-                f"{self.address}: answered a {type(message).__name__}; expected a dictionary"
+            # No pings: a method may be busy for longer than they wait.
+            opening = connect(
+                self.address,
+                compression=None,
+                max_size=None,
+                open_timeout=_OPEN_S,
+                ping_interval=None,
             )
-        return message
+            connection = self._stack.enter_context(opening)
+            first = connection.recv(timeout=_OPEN_S)
+            metadata = unpack(first) if isinstance(first, bytes) else None
+        except (OSError, EOFError, ValueError, WebSocketException) as error:
+            raise self._gone(_reason(error)) from None
+        if not isinstance(metadata, dict):
+            raise self._gone("its first message is no dictionary of metadata")
+        self.metadata = {_text(name): value for name, value in metadata.items()}
+        self._connection, self._reached = connection, True
+        return connection
+
+    def _gone(self, reason: str) -> Exception:
+        """The error of a server that is not there, or not any more."""
+        self.close()
+        if self._reached:
+            return ServerLostError(f"{self.address}: the {self.kind} answers no more ({reason})")
+        return InputError(f"{self.address}: no {self.kind} answers there ({reason})")
 
 
-def _line(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return " ".join(str(error).split())[:200] or type(error).__name__
+
+
+def _text(name: Any) -> str:
+    return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)

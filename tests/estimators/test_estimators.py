@@ -82,7 +82,7 @@ def test_a_factory_gets_its_arguments():
         (f"{HERE}:Middle", '{"scor": 1}', "unexpected keyword"),
         (f"{HERE}:Middle", "{", "no JSON"),
         (f"{HERE}:Middle", "[1]", "expected a JSON object"),
-        ("ws://127.0.0.1:9", None, "no server answers"),
+        ("ws://127.0.0.1:9", None, "no estimator server answers"),
         ("ws://127.0.0.1:9", "{}", "a server takes no --estimator-args"),
     ],
 )

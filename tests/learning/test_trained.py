@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -36,7 +38,11 @@ def test_a_policy_read_from_its_file_acts_as_before(file):
     path, trained = file
     policy = TrainedPolicy(str(path))
     assert isinstance(policy, Policy)
-    assert policy.metadata == {"trained on": "articulated/open_middle_drawer", "seed": 4}
+    assert policy.metadata == {
+        "trained on": "articulated/open_middle_drawer",
+        "seed": 4,
+        "weights sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+    }
     policy.reset(task="", instruction="", seed=0, action_space=space())
     seen = {name: jnp.asarray(v, jnp.float32) for name, v in scene().items()}
     normal = trained.normaliser(handle_frame.features(seen))

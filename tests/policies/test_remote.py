@@ -138,7 +138,7 @@ def test_a_server_that_goes_away_is_lost():
         remote = RemotePolicy(server.address)
         remote.reset(**EPISODE)
         remote.infer(OBSERVATION)
-    with pytest.raises(ServerLostError, match="repeat with --resume"):
+    with pytest.raises(ServerLostError, match="the policy server answers no more"):
         for _ in range(3):  # what is under way may still be answered
             remote.infer(OBSERVATION)
     with pytest.raises(ServerLostError):

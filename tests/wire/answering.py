@@ -21,7 +21,8 @@ def answering(
     """The address of a server that answers every question; it hangs up instead of answer number `after`."""
 
     def handle(socket: Any) -> None:
-        socket.send(pack({} if metadata is None else metadata))
+        first = {} if metadata is None else metadata
+        socket.send(first if isinstance(first, str | bytes) else pack(first))
         count = 0
         try:
             while True:

@@ -52,8 +52,12 @@ def test_bytes_that_are_no_message(content):
 def test_a_server_answers_each_question():
     with answering(lambda q: {"sum": q["a"].sum()}, metadata={"name": "adder"}) as address:
         client = Client(address)
+        assert client.metadata == {}
+        client.open()
         assert client.metadata == {"name": "adder"}
         assert [client.ask({"a": np.arange(n)})["sum"] for n in (3, 4)] == [3, 6]
+        client.close()
+        assert client.ask({"a": np.arange(5)})["sum"] == 10  # connects again
         client.close()
 
 
@@ -61,35 +65,47 @@ def test_nobody_there_is_an_input_error():
     with answering(lambda q: q) as address:
         pass
     assert is_address(address) and not is_address("pkg.mod:Factory")
-    with pytest.raises(InputError, match="no server answers"):
-        Client(address)
-    with pytest.raises(InputError, match="no server answers"):
-        Client("ws://")
+    for wrong in (address, "ws://"):
+        with pytest.raises(InputError, match=f"{wrong}: no estimator answers there") as caught:
+            Client(wrong, "estimator").open()
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("metadata", [[1], b"\xc1", "hello"])
+def test_a_server_without_metadata_is_of_something_else(metadata):
+    serving = answering(lambda q: q, metadata=metadata)
+    with serving as address, pytest.raises(InputError, match="no server answers there"):
+        Client(address).open()
 
 
 def test_a_server_that_hangs_up_is_lost():
     with answering(lambda q: {}, after=1) as address:
         client = Client(address)
         client.ask({})
-        with pytest.raises(ServerLostError, match="connection lost"):
+        with pytest.raises(ServerLostError, match="the server answers no more .connection lost"):
             client.ask({})
+    with pytest.raises(ServerLostError, match="answers no more"):
+        client.open()
 
 
 @pytest.mark.parametrize(
     ("said", "message"),
     [
-        ([1, 2], "answered a list; expected a dictionary"),
-        (b"\xc1", "no msgpack message"),
-        ("Traceback\nValueError: no such category", "failed: ValueError: no such category"),
+        (b"\xc1", "the server's answer is no msgpack message"),
+        ("Traceback\nValueError: no category", "the server failed: ValueError: no category"),
+        ("", "no reason given"),
     ],
 )
-def test_an_answer_that_is_none(said, message):
-    kind = RemoteFailureError if isinstance(said, str) else ServerLostError
-    with answering(lambda q: said) as address, pytest.raises(kind, match=message):
-        Client(address).ask({})
+def test_an_answer_that_is_none_is_the_methods_failure(said, message):
+    with answering(lambda q: said) as address:
+        client = Client(address)
+        with pytest.raises(RemoteFailureError, match=message) as caught:
+            client.ask({})
+        assert caught.value.text == (said if isinstance(said, str) else "")
+        client.close()
 
 
-def test_a_server_that_says_nothing_in_time():
+def test_a_server_that_says_nothing_in_time_is_lost():
     from time import sleep
 
     with answering(lambda q: sleep(0.5) or {}) as address:

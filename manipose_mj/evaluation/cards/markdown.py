@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.policy_settings import tells_true_poses
+
 OWN_CODE = "this repository"
 
 
@@ -31,12 +34,18 @@ def method_text(method: Mapping[str, Any]) -> str:
     return _who(method) + grasps + (f"; errors made on purpose: {', '.join(made)}" if made else "")
 
 
+def _coverage(run: Mapping[str, Any]) -> str:
+    """How many of the protocol's tasks a run is of, such as `1 of 34`."""
+    return f"{len(run['tasks'])} of {len(protocol.load(run['protocol']).tasks)}"
+
+
 def _who(method: Mapping[str, Any]) -> str:
     policy = method.get("policy")
     if policy:
         name = policy.get("name", "?") if isinstance(policy, Mapping) else policy
         seen = policy.get("obs_mode") if isinstance(policy, Mapping) else None
-        return f"policy `{name}`" + (f", observations `{seen}`" if seen else "")
+        told = ", true poses among them" if seen and tells_true_poses(seen) else ""
+        return f"policy `{name}`" + (f", observations `{seen}`{told}" if seen else "")
     if method.get("pose") != "estimated":
         return "the baseline planner with true poses"
     estimator = method.get("estimator")
@@ -57,6 +66,7 @@ def _run_lines(run: Mapping[str, Any]) -> list[str]:
     return [
         f"## Protocol {run['protocol']}, {seeds}",
         "",
+        f"{_coverage(run)} tasks of the protocol. "
         f"Mean over tasks: {run['mean_success_at_end']:.1%} at end, {run['mean_success_once']:.1%} once.",
         "",
         "| task | n | at end | Wilson 95 % | once | Wilson 95 % | failures |",

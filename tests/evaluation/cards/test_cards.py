@@ -83,6 +83,10 @@ def test_a_card_states_both_rates_with_intervals_protocol_and_hash(card, results
     assert "true poses" in text and f"`{TASK}` | 6" in text and "https://example.org/a" in text
 
 
+def test_a_card_says_how_many_of_the_tasks_it_covers(card):
+    assert "\n2 of 34 tasks of the protocol. Mean over tasks: " in (card / "card.md").read_text()
+
+
 def test_an_untouched_card_passes(card, capsys):
     assert check_card(card) == 12
     assert main(["card", "--check", str(card), str(card)]) == 0
@@ -244,8 +248,15 @@ def test_runs_of_different_methods_make_no_card(results, tmp_path, capsys):
             {"pose": "estimated", "estimator": {"name": "a:B", "given CAD": True}},
             "estimated by `a:B`, which was given the objects' meshes",
         ),
-        ({"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+rgb"}}, "`state+rgb`"),
+        (
+            {"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+rgb"}},
+            "policy `a:B`, observations `state+rgb`",
+        ),
+        (
+            {"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+pose"}},
+            "policy `a:B`, observations `state+pose`, true poses among them",
+        ),
     ],
 )
 def test_a_method_is_described_with_what_it_was_told(method, text):
-    assert text in method_text(method)
+    assert method_text(method).endswith(text)

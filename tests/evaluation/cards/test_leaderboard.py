@@ -46,6 +46,7 @@ def test_the_page_shows_every_card(hook):
         linked = f"[{name}]({url})" if url.startswith("https://") else name
         assert f"| {linked} |" in shown and f"\n## {content['name']}\n" in shown
         for run in content["runs"]:
+            assert f" | {len(run['tasks'])} of 34 | " in shown
             assert f"results sha256 `{run['results_sha256'][:16]}`" in shown
 
 
