@@ -163,7 +163,8 @@ def push_part(
             continue
         complete += 1
         start_tilt = float(way.tilts[0])
-        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], hold.opening):
+        query = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
+        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], query):
             free_path = planner.free_path(
                 estimate.joints, line[-1], CollisionQuery(opening=hold.opening)
             )
@@ -189,9 +190,13 @@ def ending_free(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> Par
 def off_surface(
     planner: MotionPlanner, part: PartEstimate, way: PartWay, joints: Float[np.ndarray, "7"]
 ) -> Float[np.ndarray, "t 7"] | None:
-    """Joint targets away from what was pushed, from where the push ended."""
+    """Joint targets away from what was pushed, from where the push ended; out of what estimates have the hand in."""
     assert isinstance(way.hold, Push)
-    return next(_lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, None), None)
+    usual = CollisionQuery(CONTACT, target=part.geoms)
+    for query in (usual, planner.excusing(joints, usual)):
+        for line in _lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, query):
+            return line
+    return None
 
 
 def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Iterator[Push]:
@@ -255,11 +260,10 @@ def _lines_off(
     hold: Push,
     tilt: float,
     joints: Float[np.ndarray, "7"],
-    opening: float | None,
+    query: CollisionQuery,
 ) -> Iterator[Float[np.ndarray, "t 7"]]:
     """Straight lines off the surface, the part where the scene has it."""
-    touched = frozenset({planner.body_name(part.body)})
-    query = CollisionQuery(CONTACT, opening=opening, target=part.geoms)
+    touched = frozenset({planner.body_name(part.body)}) | planner.overlapped(query)
     pose = part.base_pose @ joint_motion(part, part.opening)
     for away, back in _PUSH_STANDOFFS:
         goal = pose @ shifted(hold, away).tcp_poses(np.array([tilt]))[0]

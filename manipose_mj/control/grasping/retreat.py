@@ -27,6 +27,8 @@ def retreat(
 ) -> Float[np.ndarray, "t 7"] | None:
     """Joint targets straight back, or else up, to where the next motion has room if there is such a place.
 
+    Where the scene has the hand in something from the start, as estimates may, it gets out, no deeper in.
+
     Args:
       planner: Plans in the scene of `estimate`.
       estimate: What is where.
@@ -38,7 +40,22 @@ def retreat(
     clearance = replace(CONTACT, arm=0.0)
     if near is not None:
         clearance = replace(clearance, target=near, arm=near / 2)
-    query = CollisionQuery(clearance, target=released)
+    usual = CollisionQuery(clearance, target=released)
+    for query in (usual, planner.excusing(estimate.joints, usual)):
+        line = _straight(planner, estimate, query, touched | planner.overlapped(query), distances)
+        if line is not None:
+            return line
+    return None
+
+
+def _straight(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    query: CollisionQuery,
+    touched: frozenset[str],
+    distances: Sequence[float],
+) -> Float[np.ndarray, "t 7"] | None:
+    """As `retreat`, under these assumptions."""
     back = (planner.backed_off(estimate.joints, distance) for distance in distances)
     up = (planner.raised(estimate.joints, distance) for distance in distances)
     for ways in (back, up):

@@ -25,6 +25,7 @@ _CHECK_EVERY = 4
 _CHECK_RESOLUTION = 0.02  # of free paths, in any joint [rad]
 # From its support on which an attached object must be free [m].
 _SUPPORT_DISTANCE = 0.02
+_EXCUSED = 0.001  # how much deeper a robot may be than at the start, in what it starts in [m]
 _SPEED_SHARES = (1.0, 0.5, 0.25)
 _TIMING = Timing()
 _LINE = LineConfig()
@@ -89,6 +90,21 @@ class MotionPlanner:
     def collides(self, joints: Float[np.ndarray, "7"], query: CollisionQuery) -> bool:
         """Whether the arm, with what is attached, is too close to anything."""
         return self.scene.in_collision(joints, self._allowing(query))
+
+    def excusing(self, joints: Float[np.ndarray, "7"], query: CollisionQuery) -> CollisionQuery:
+        """The same question for a motion that starts in a configuration [rad] in which the robot is, collision or not.
+
+        It may be as deep in anything as it is there, so that it can get out.
+        """
+        depths = self.scene.depths(joints, self._allowing(query))
+        return replace(query, depths=np.where(depths > 0, depths + _EXCUSED, 0.0))
+
+    def overlapped(self, query: CollisionQuery) -> frozenset[str]:
+        """Names of the bodies that a question excuses the robot for being in."""
+        if query.depths is None:
+            return frozenset()
+        bodies = self.scene.model.geom_bodyid[query.depths > 0]
+        return frozenset(self.body_name(int(body)) for body in bodies if body)
 
     def obstacles(
         self, joints: Float[np.ndarray, "7"], query: CollisionQuery
