@@ -54,6 +54,7 @@ _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it 
 _SETTLE = 0.25  # after letting go [s]
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
+_UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
 _GIVING_WAY = (0.006, 0.012)
 
 
@@ -318,10 +319,15 @@ def retraction_of(
 def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
     """How far to open [m]: as far as neighbours allow."""
     released = estimate.parts.get(name) or estimate.objects[name]
-    for margin in _LETTING_GO:
+    margins = _LETTING_GO
+    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released.geoms)
+    if name in estimate.objects and estimate.objects[name].uncertainty > 0:
+        # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
+        margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
+        query = planner.excusing(estimate.joints, query)
+    for margin in margins:
         opening = min(estimate.opening + margin, MAX_OPENING)
-        query = CollisionQuery(replace(CONTACT, arm=0.0), opening=opening, target=released.geoms)
-        if not planner.collides(estimate.joints, query):
+        if not planner.collides(estimate.joints, replace(query, opening=opening)):
             return opening
     return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
 

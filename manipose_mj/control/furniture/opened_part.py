@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
+from manipose_mj.control.furniture.cavity_rim import carrying_level, seen_rim
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import invert, transform
@@ -22,6 +23,8 @@ _BIN = 0.005  # [m]
 _SIDE_MARGIN = 0.004  # kept off sides that were measured [m]
 _UNSEEN = 0.02  # and off those that were not, from the panel's edges [m]
 _ROOF = 0.015  # below the panel's upper edge [m]
+_BEHIND_MOUTH = 0.06  # from where on what faces the front is no frame [m]
+_RIM_ROOF = 0.006  # kept off a roof that was measured [m]
 
 
 def seen_open(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
@@ -84,13 +87,22 @@ def _door(
     if inside.sum() < 4 * _LEAST:
         return part
     floor, left, right = _floor_and_sides(points, normals, inside, part.panel)
-    # The rear: where most points look out of the front.
-    facing = inside & (normals[:, 0] > _FACING)
+    below = inside & (points[:, 2] < (low[2] + 2 * high[2]) / 3)
+    carrying = carrying_level(points, below, normals)
+    floor = floor if carrying is None else carrying + 0.001
+    rim = seen_rim(points, normals, part.panel)
+    left = left if rim.left is None else max(left, rim.left + _SIDE_MARGIN)
+    right = right if rim.right is None else min(right, rim.right - _SIDE_MARGIN)
+    roof = high[2] - max(_ROOF, 0.02) if rim.roof is None else rim.roof - _RIM_ROOF
+    mouth = front - 0.018 if rim.mouth is None else rim.mouth
+    # The rear: where most points look out of the front, those of the frame around the opening left out.
+    behind = inside & (points[:, 0] < mouth - _BEHIND_MOUTH)
+    facing = behind & (normals[:, 0] > _FACING)
     rear = float(np.percentile(points[inside, 0], 3))
     if facing.sum() >= _LEAST:
         rear = _mode(points[facing, 0]) + 0.004
     hole_low = np.array([rear, left, floor])
-    hole_high = np.array([front - 0.018, right, high[2] - max(_ROOF, 0.02)])
+    hole_high = np.array([mouth, right, roof])
     if (hole_high - hole_low < 0.05).any():
         return part
     cavity = Cavity((hole_low + hole_high) / 2, hole_high - hole_low, moves_with_part=False)

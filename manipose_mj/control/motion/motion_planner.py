@@ -122,7 +122,7 @@ class MotionPlanner:
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
-        Keeps as far from everything as the start allows.
+        Keeps as far from everything as the start allows; out of what a scene has the start in, it leads no deeper in.
 
         Args:
           start: A configuration [rad].
@@ -133,6 +133,8 @@ class MotionPlanner:
         query = query or CollisionQuery()
         if self.collides(goal, query.keeping(GRAZING if tight else TRANSIT)):
             return None
+        if self.collides(start, query.keeping(GRAZING)):
+            query = self.excusing(start, query.keeping(GRAZING))
         for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
             widely = query.keeping(wide)
             if self.collides(start, widely) or (tight and self.collides(goal, widely)):
