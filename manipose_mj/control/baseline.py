@@ -56,7 +56,9 @@ class _Progress:
         """A plan failed: where it has moved a part, what failed before may do now."""
         shares = [{p.name: _share_open(p) for p in each.parts.values()} for each in (before, after)]
         if any(abs(shares[1][name] - share) > _LED_ON for name, share in shares[0].items()):
-            self.failures_here = -1  # with the failure that is about to be counted: the first plan again
+            self.failures_here = (
+                -1
+            )  # with the failure that is about to be counted: the first plan again
 
     def failed_again(self, plan: Plan, estimate: SceneEstimate, *, counts: bool) -> bool:
         """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since."""

@@ -12,7 +12,10 @@ _BEHIND = (0.008, 0.06)
 _PLANE = 0.008
 _LEAST = 60  # points that make a frame
 _BIN = 0.010  # in which points of a frame are counted [m]
-_SIDE_LEAST, _SIDE_SHARE = 6, 0.25  # points of a bin that is a side; of the fullest bin of that side
+_SIDE_LEAST, _SIDE_SHARE = (
+    6,
+    0.25,
+)  # points of a bin that is a side; of the fullest bin of that side
 _MIDDLE = 0.5  # share of the opening about its middle in which a side is looked for
 _FACING, _FLAT = 0.75, 0.8  # cosines of normals to an axis
 _STEP, _LEVEL = 0.004, 0.006  # between heights of surfaces, and of points from theirs [m]
@@ -81,7 +84,9 @@ def _side(values: Float[np.ndarray, "n"], middle: float, sign: float) -> float |
 
 
 def carrying_level(
-    points: Float[np.ndarray, "n 3"], inside: Bool[np.ndarray, "n"], normals: Float[np.ndarray, "n 3"]
+    points: Float[np.ndarray, "n 3"],
+    inside: Bool[np.ndarray, "n"],
+    normals: Float[np.ndarray, "n 3"],
 ) -> float | None:
     """Height of the uppermost wide surface: a rack is over the floor that shows through it [m]; None if there is none.
 

@@ -67,7 +67,9 @@ class EstimatedFurniture:
         self._mask = 0
         self._held: _Held | None = None
         self._moved: set[str] = set()
-        self._before: dict[str, float] = {}  # openings of parts that were pushed and not looked at since
+        self._before: dict[
+            str, float
+        ] = {}  # openings of parts that were pushed and not looked at since
 
     def reset(self, key: Any) -> None:
         """Look at the furniture of the episode.

@@ -19,7 +19,9 @@ _BETTER = 0.85  # of the misfit that is left, for another opening to replace the
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESS = 0.018  # of a panel, whose other side may be all that shows [m]
 _SEEN = 0.75  # share of the points that has to be seen at best: some are hidden
-_HIDDEN = 0.5  # a point that nobody can see counts as so far, as a share of what is far: it tells nothing
+_HIDDEN = (
+    0.5  # a point that nobody can see counts as so far, as a share of what is far: it tells nothing
+)
 _MOST = 300
 
 
