@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.execution.part_lead import lead_part
+from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
@@ -32,10 +33,10 @@ from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
 from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
-from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
-from manipose_mj.poses import invert, rotation_angle
+from manipose_mj.poses import invert
 
 # Past this the object in the hand is not where the grasp put it.
 _LOST_DISTANCE = 0.04
@@ -111,7 +112,7 @@ class Primitives:
             yield from self._let_go(planner, name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
         self._executor.hold(name)
-        self._held = _Held(name, pick, _pose_in_hand(estimate, name))
+        self._held = _Held(name, pick, pose_in_hand(estimate, name))
 
     def move_to(self, planner: MotionPlanner, step: Step) -> Actions:
         """Bring what is held to its destination."""
@@ -185,12 +186,13 @@ class Primitives:
         yield from self._executor.follow(free)
         estimate, planner = self._observe(planner)
         now = self._check_held(estimate, name)
-        if _moved(pose_tcp, now, _SLIP):
+        slip = slip_of(estimate, name, now, pose_tcp)
+        if exceeds(slip, _SLIP):
             again = _placed_again(planner, estimate, step, now)
             if again is not None:
                 free, place = again
                 yield from self._executor.follow(free)
-            elif _moved(pose_tcp, now, _BIG_SLIP):
+            elif exceeds(slip, _BIG_SLIP):
                 raise StageFailure("plan", f"{name} slipped, no way to set it down as it is now")
         yield from self._executor.follow(place.descent)
 
@@ -203,7 +205,7 @@ class Primitives:
         if self._executor.feels_joints:
             yield from lead_part(self._executor, planner, step.subject, step.opening)
             self._held = replace(
-                self._held, pose_tcp=_pose_in_hand(self._executor.observe(), step.subject)
+                self._held, pose_tcp=pose_in_hand(self._executor.observe(), step.subject)
             )
             return
         way = way_in_hand(planner, estimate, part, step.opening)
@@ -288,9 +290,8 @@ class Primitives:
           StageFailure: It is no longer where the grasp had it.
         """
         assert self._held is not None
-        now, then = _pose_in_hand(estimate, name), self._held.pose_tcp
-        moved = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
-        turned = float(rotation_angle(now[:3, :3], then[:3, :3]))
+        now, then = pose_in_hand(estimate, name), self._held.pose_tcp
+        moved, turned = slip_of(estimate, name, now, then)
         # A handle may slide along its bar and turn about it; what counts there is the joint.
         is_part = name in estimate.parts
         if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
@@ -384,18 +385,3 @@ def _placed_again(
     query = estimate.in_hand(step.subject).query()
     free = planner.free_path(estimate.joints, place.above, query)
     return None if free is None else (free, place)
-
-
-def _pose_in_hand(estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
-    """`T_tcp_label` of an object, or of a part's handle."""
-    part: PartEstimate | None = estimate.parts.get(name)
-    pose = estimate.objects[name].label_pose if part is None else part.handle_pose
-    return invert(estimate.tcp_pose) @ pose
-
-
-def _moved(
-    a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"], limit: tuple[float, float]
-) -> bool:
-    """Whether an object has slipped in the hand by more than a distance [m] or an angle [rad]."""
-    shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
-    return shift > limit[0] or float(rotation_angle(a[:3, :3], b[:3, :3])) > limit[1]
