@@ -11,6 +11,7 @@ from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     ending_free,
@@ -49,6 +50,7 @@ _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
+_IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
@@ -81,6 +83,7 @@ class Primitives:
         # `T_tcp_label` of grasps that did not hold or led nowhere, and of those objects were last released from.
         self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
+        self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
 
     @property
     def held(self) -> str | None:
@@ -232,7 +235,7 @@ class Primitives:
         """
         part = self._executor.observe().parts[name]
         span = float(np.ptp(part.joint.range))
-        for _ in range(1 if self._executor.feels_joints else _PUSHES):
+        for _ in range(_PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
                 return
             yield from self._push_once(planner, name, opening)
@@ -248,12 +251,15 @@ class Primitives:
         part = estimate.parts[name]
         beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
         aim = opening - beyond if opening <= part.joint.range[0] else opening
-        push = push_part(planner, estimate, part, aim)
+        push = push_part(planner, estimate, part, aim, self._in_vain.get(name, ()))
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
         self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
+        gone = abs(estimate.parts[name].opening - part.opening)
+        if gone < _IN_VAIN * abs(opening - part.opening) and isinstance(push.way.hold, Push):
+            self._in_vain.setdefault(name, []).append(push.way.hold)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:
             yield from self._executor.follow(back)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,7 @@ _AJAR = 0.5  # of a door, enough to reach behind it [rad]
 # A way that ends sooner is worth it where none goes on: the hand takes hold again from there [m or rad].
 _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
+_ALIKE = 0.03  # between pushes that meet a part at nearly the same place [m]
 _MAX_PUSHES = 24  # for which a way is looked for
 _MAX_TRIES = 12  # complete ways for which an approach is looked for
 
@@ -146,15 +147,20 @@ def way_in_hand(
 
 
 def push_part(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    opening: float,
+    in_vain: Sequence[Push] = (),
 ) -> PartPush:
-    """A push with closed fingers that moves the part all the way.
+    """A push with closed fingers that moves the part all the way; none near those that were made in vain.
 
     Raises:
       StageFailure: There is none.
     """
     complete = tried = 0
     holds = list(_pushes(planner, part, opening))
+    holds = [hold for hold in holds if not any(_alike(hold, other) for other in in_vain)]
     holds.sort(key=lambda hold: -promise(part, hold, opening))
     for hold in holds[:_MAX_PUSHES]:
         tried += 1
@@ -203,6 +209,12 @@ def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Itera
     if opening < part.opening:
         return shutting_pushes(planner, part)
     return opening_pushes(planner, part)
+
+
+def _alike(one: Push, other: Push) -> bool:
+    """Whether two pushes meet a part at nearly the same place."""
+    near = float(np.linalg.norm(one.point - other.point)) < _ALIKE
+    return near and one.flat == other.flat and float(one.normal @ other.normal) > 0.9
 
 
 def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:

@@ -33,7 +33,8 @@ OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
 AJAR = 0.3  # from which on a door can be pushed from inside [rad]
 SHUT_ENOUGH = 0.005  # of a joint [m or rad]
-NOT_SHUT = 0.08  # of its range, from which on an estimated part stands otherwise than it should
+# From which openings on a part that is estimated stands otherwise than it should: of its range, [m or rad].
+NOT_OPEN, NOT_SHUT = 0.08, {"slide": 0.012, "hinge": 0.05}
 CAVITY_MARGIN = np.array([0.010, 0.010, 0.004])  # in all, along each axis [m]
 # Where in the cavity, as a share of the free way from its middle to its front: the hand that sets
 # something down needs room in front of what is above, or beside, or both.
@@ -115,9 +116,13 @@ def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         part = estimate.parts[goal.part]
         low, high = part.joint.range
         share = (part.opening - low) / (high - low)
-        if isinstance(goal, ShutGoal) and share > NOT_SHUT:
-            return True
-        if isinstance(goal, OpenGoal) and share < goal.fraction - NOT_SHUT:
+        if isinstance(goal, OpenGoal):
+            wrong = share < float(goal.fraction) - NOT_OPEN
+        elif goal.fraction is not None:
+            wrong = share > 1 - float(goal.fraction)
+        else:
+            wrong = part.opening - low > NOT_SHUT[part.joint.kind]
+        if wrong:
             return True
     return False
 
