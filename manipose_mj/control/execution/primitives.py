@@ -265,8 +265,14 @@ class Primitives:
             yield from self._executor.follow(back)
         # Fingers that caught on something are still there.
         estimate, planner = self._observe(planner)
-        if planner.collides(estimate.joints, CollisionQuery(GRAZING)):
+        if not planner.collides(estimate.joints, CollisionQuery(GRAZING)):
+            return
+        try:
             yield from self._executor.follow(_retreat(planner, estimate, name))
+        except StageFailure:
+            # Back as the hand came: the part does not follow it.
+            yield from self._executor.follow(push.way.targets(self._executor.timestep)[::-1])
+            yield from self._executor.follow(push.approach[::-1])
 
     def _push_object(self, planner: MotionPlanner, step: Step) -> Actions:
         """With closed fingers, over the table, then up."""

@@ -275,7 +275,7 @@ def _lines_off(
     query: CollisionQuery,
 ) -> Iterator[Float[np.ndarray, "t 7"]]:
     """Straight lines off the surface, the part where the scene has it."""
-    touched = frozenset({planner.body_name(part.body)}) | planner.overlapped(query)
+    touched = frozenset({planner.body_name(part.body)}) | planner.ignored(query)
     pose = part.base_pose @ joint_motion(part, part.opening)
     for away, back in _PUSH_STANDOFFS:
         goal = pose @ shifted(hold, away).tcp_poses(np.array([tilt]))[0]

@@ -42,7 +42,7 @@ def retreat(
         clearance = replace(clearance, target=near, arm=near / 2)
     usual = CollisionQuery(clearance, target=released)
     for query in (usual, planner.excusing(estimate.joints, usual)):
-        line = _straight(planner, estimate, query, touched | planner.overlapped(query), distances)
+        line = _straight(planner, estimate, query, touched | planner.ignored(query), distances)
         if line is not None:
             return line
     return None

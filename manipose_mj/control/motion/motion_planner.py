@@ -99,12 +99,15 @@ class MotionPlanner:
         depths = self.scene.depths(joints, self._allowing(query))
         return replace(query, depths=np.where(depths > 0, depths + _EXCUSED, 0.0))
 
-    def overlapped(self, query: CollisionQuery) -> frozenset[str]:
-        """Names of the bodies that a question excuses the robot for being in."""
-        if query.depths is None:
+    def ignored(self, query: CollisionQuery) -> frozenset[str]:
+        """Names of the bodies that the way of a straight line does not keep away from, for it is checked afterwards.
+
+        None, but where a question excuses the robot for being in something: there nothing could be kept away from.
+        """
+        if query.depths is None or not query.depths.any():
             return frozenset()
-        bodies = self.scene.model.geom_bodyid[query.depths > 0]
-        return frozenset(self.body_name(int(body)) for body in bodies if body)
+        model = self.arm.model
+        return frozenset(model.body(body).name for body in range(model.nbody))
 
     def obstacles(
         self, joints: Float[np.ndarray, "7"], query: CollisionQuery

@@ -13,7 +13,7 @@ from manipose_mj.control.furniture.cavity_rim import carrying_level, seen_rim
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
-from manipose_mj.poses import SymmetryGroup
+from manipose_mj.poses import SymmetryGroup, transform
 
 # An oven's opening in a front at 0.2, 2 cm behind the front of its door; its panel as first guessed is larger.
 PANEL = np.array([[0.18, -0.25, 0.0], [0.20, 0.25, 0.30]])
@@ -68,7 +68,7 @@ def test_objects_stand_on_a_rack_though_the_floor_shows_through_it(rack, height)
     assert carrying_level(points, inside, normals) == pytest.approx(height, abs=0.003)
 
 
-def test_an_open_door_shows_the_whole_cavity():
+def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
     points, normals = oven(rack=True)
     handle = PoseLabel(
         np.zeros(3), np.eye(3), "handle", np.full(3, 0.02), SymmetryGroup(np.eye(3)[None])
@@ -79,7 +79,13 @@ def test_an_open_door_shows_the_whole_cavity():
     )
     solid = np.array([[[-0.22, -0.3, 0.0], [0.2, 0.3, 0.32]]])
     model = FurnitureModel(np.eye(4), solid, (door,), "oven")
+    # The door's own free edge is where its opening ends, not where the panel was guessed to.
+    face, across = sheet([0.18, -0.25, 0.0], [0.18, RIGHT + 0.01, 0.30], X)
+    motion = door.motion(door.opening)
+    points = np.concatenate([points, transform(motion, face)])
+    normals = np.concatenate([normals, across @ motion[:3, :3].T])
     found = seen_open(model, door, SceneCloud(points, normals, np.ones(len(points), int)))
+    np.testing.assert_allclose(found.panel[:, 1:], [[-0.25, 0.0], [RIGHT + 0.01, 0.30]], atol=0.01)
     cavity = found.part.cavity
     assert cavity is not None
     low, high = cavity.center - cavity.extents / 2, cavity.center + cavity.extents / 2
