@@ -61,7 +61,13 @@ class _Progress:
             )  # with the failure that is about to be counted: the first plan again
 
     def failed_again(self, plan: Plan, estimate: SceneEstimate, *, counts: bool) -> bool:
-        """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since."""
+        """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since.
+
+        Args:
+          plan: That failed.
+          estimate: With which it was made.
+          counts: Whether the failure counts.
+        """
         self.failures_here += counts
         openings = {part.name: round(_share_open(part), 1) for part in estimate.parts.values()}
         text = f"{plan_to_json(plan)} {openings}"
@@ -201,10 +207,9 @@ class Baseline:
                 most = MAX_FAILED_MOVES if step_by_step else plans
                 # In clutter the same plan may be carried out another way.
                 counts = acted or not step_by_step
-                now = executor.observe()
                 if scene.perception.feels_joints and counts and not falls_short:
-                    progress.led_on(estimate, now)
-                same = progress.failed_again(plan, now, counts=counts)
+                    progress.led_on(estimate, executor.observe())
+                same = progress.failed_again(plan, estimate, counts=counts)
                 exhausted = (same and not step_by_step) or failures == most
                 mends = (*_WORTH_ANOTHER_PLAN, "release") if step_by_step else _WORTH_ANOTHER_PLAN
                 if exhausted or (failure.stage not in mends and not falls_short):
