@@ -11,15 +11,15 @@ import jax
 
 from manipose_mj.storage.cache_root import cache_root
 
-_VARIABLE = "JAX_COMPILATION_CACHE_DIR"
+_VARIABLE, _OPTION = "JAX_COMPILATION_CACHE_DIR", "jax_compilation_cache_dir"
 _WORTH_KEEPING = 0.2  # time to compile [s]
 
 
 def keep_compiled() -> None:
     """From now on keep what JAX compiles in this package's cache, unless the user has said where or said no."""
-    if _VARIABLE in os.environ or jax.config.jax_compilation_cache_dir is not None:
+    if _VARIABLE in os.environ or getattr(jax.config, _OPTION, None):
         return
-    jax.config.update("jax_compilation_cache_dir", str(cache_root() / "compiled" / _processor()))
+    jax.config.update(_OPTION, str(cache_root() / "compiled" / _processor()))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", _WORTH_KEEPING)
 
 
