@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -362,9 +363,9 @@ def _retreat(
     released = estimate.parts.get(name) or estimate.objects[name]
     distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
     touched = frozenset({planner.body_name(released.body)})
-    for allowance in (planner.contact_allowance, *_GIVING_WAY):
+    for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
         pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances, near)
+        line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
         if line is not None:
             return line
     raise StageFailure("release", f"no way to back off from {name}")

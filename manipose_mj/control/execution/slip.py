@@ -22,9 +22,12 @@ def slip_of(
     now: Float[np.ndarray, "4 4"],
     then: Float[np.ndarray, "4 4"],
 ) -> tuple[float, float]:
-    """Between two poses in the hand: distance [m] and angle [rad], but for turns that change nothing."""
+    """Between two poses in the hand: distance [m] and angle [rad].
+
+    Of what is estimated, but for turns that change nothing: which of them an estimate says is chance.
+    """
     obj = estimate.objects.get(name)
-    if obj is None:
+    if obj is None or obj.uncertainty == 0:
         shift = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
         return shift, float(rotation_angle(now[:3, :3], then[:3, :3]))
     shift, turn = pose_error(now, then, obj.label.symmetry)

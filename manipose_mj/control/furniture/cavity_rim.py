@@ -83,7 +83,7 @@ def _side(values: Float[np.ndarray, "n"], middle: float, sign: float) -> float |
     return middle + sign * float(edges[int(full.argmax())]) if full.any() else None
 
 
-def carrying_level(
+def supporting_level(
     points: Float[np.ndarray, "n 3"],
     inside: Bool[np.ndarray, "n"],
     normals: Float[np.ndarray, "n 3"],

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
-from manipose_mj.control.furniture.cavity_rim import carrying_level, seen_rim
+from manipose_mj.control.furniture.cavity_rim import supporting_level, seen_rim
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import invert, transform
@@ -92,8 +92,8 @@ def _door(
         return measured
     floor, left, right = _floor_and_sides(points, normals, inside, part.panel)
     below = inside & (points[:, 2] < (low[2] + 2 * high[2]) / 3)
-    carrying = carrying_level(points, below, normals)
-    floor = floor if carrying is None else carrying + 0.001
+    supporting = supporting_level(points, below, normals)
+    floor = floor if supporting is None else supporting + 0.001
     rim = seen_rim(points, normals, part.panel)
     left = left if rim.left is None else max(left, rim.left + _SIDE_MARGIN)
     right = right if rim.right is None else min(right, rim.right - _SIDE_MARGIN)

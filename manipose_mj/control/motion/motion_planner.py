@@ -125,7 +125,7 @@ class MotionPlanner:
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
-        Keeps as far from everything as the start allows; out of what a scene has the start in, it leads no deeper in.
+        Keeps as far from everything as the start allows; out of what a scene has the robot in, it leads no deeper in.
 
         Args:
           start: A configuration [rad].
@@ -136,7 +136,7 @@ class MotionPlanner:
         query = query or CollisionQuery()
         if self.collides(goal, query.keeping(GRAZING if tight else TRANSIT)):
             return None
-        if self.collides(start, query.keeping(GRAZING)):
+        if self._is_here(start) and self.collides(start, query.keeping(GRAZING)):
             query = self.excusing(start, query.keeping(GRAZING))
         for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
             widely = query.keeping(wide)
@@ -194,6 +194,11 @@ class MotionPlanner:
             if self.scene.in_collision(q, later if gone > _SUPPORT_DISTANCE else at_start):
                 return None
         return targets
+
+    def _is_here(self, joints: Float[np.ndarray, "7"]) -> bool:
+        """Whether the arm was observed in this configuration [rad]."""
+        addresses = self.scene.collision_model.arm_addresses
+        return bool(np.abs(self.scene.positions.qpos[addresses] - joints).max() < 1e-6)
 
     def _allowing(self, query: CollisionQuery) -> CollisionQuery:
         return replace(

@@ -9,7 +9,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.cavity_rim import carrying_level, seen_rim
+from manipose_mj.control.furniture.cavity_rim import supporting_level, seen_rim
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
@@ -65,7 +65,7 @@ def test_without_a_frame_nothing_is_said_of_it():
 def test_objects_stand_on_a_rack_though_the_floor_shows_through_it(rack, height):
     points, normals = oven(rack)
     inside = (points[:, 0] < MOUTH - 0.01) & (points[:, 2] < 0.2)
-    assert carrying_level(points, inside, normals) == pytest.approx(height, abs=0.003)
+    assert supporting_level(points, inside, normals) == pytest.approx(height, abs=0.003)
 
 
 def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
