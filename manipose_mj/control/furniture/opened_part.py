@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
-from manipose_mj.control.furniture.cavity_rim import supporting_level, seen_rim
+from manipose_mj.control.furniture.cavity_rim import seen_rim, supporting_level
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import invert, transform

@@ -184,11 +184,16 @@ def push_part(
     )
 
 
-def ending_free(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> PartWay | None:
-    """As much of a grip's way as leads to where the open hand can back off; None if nowhere."""
+def ending_free(
+    planner: MotionPlanner, part: PartEstimate, way: PartWay, clearance: Clearance = APPROACH
+) -> PartWay | None:
+    """As much of a grip's way as leads to where the open hand can back off; None if nowhere.
+
+    `clearance` is how near it may be to the part and to what is around it then.
+    """
     for count in range(len(way.openings), 1, -_STEP_BACK):
         shorter = PartWay(way.hold, way.joints[:count], way.openings[:count], way.tilts[:count])
-        if _can_get_off(planner, part, shorter):
+        if _can_get_off(planner, part, shorter, clearance):
             return shorter
     return None
 
@@ -240,11 +245,14 @@ def _turned(way: PartWay) -> float:
     return float(np.abs(np.diff(way.joints, axis=0)).max(axis=1).sum() + 0.5 * abs(way.tilts[0]))
 
 
-def _can_get_off(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
+def _can_get_off(
+    planner: MotionPlanner, part: PartEstimate, way: PartWay, clearance: Clearance
+) -> bool:
     """Whether the open hand can back off from the handle at the end."""
     opening = way.hold.opening_before
     at_end = planner.within(with_part_at(planner.scene, part, float(way.openings[-1])))
-    back = _backwards(at_end, part, way.joints[-1], opening, (HANDLE_RETREATS[-1],))
+    standoffs = (HANDLE_RETREATS[-1],)
+    back = _backwards(at_end, part, way.joints[-1], opening, standoffs, clearance)
     return back is not None
 
 
@@ -254,10 +262,11 @@ def _backwards(
     joints: Float[np.ndarray, "7"],
     opening: float,
     standoffs: tuple[float, ...],
+    clearance: Clearance = APPROACH,
 ) -> Float[np.ndarray, "t 7"] | None:
     """A straight approach along the hand's own axis, which ends at `joints`."""
     touched = frozenset({planner.body_name(part.body)})
-    query = CollisionQuery(APPROACH, opening=opening, target=part.geoms)
+    query = CollisionQuery(clearance, opening=opening, target=part.geoms)
     for standoff in standoffs:
         goal = planner.backed_off(joints, standoff)
         back = planner.line(joints, goal, query, touched=touched)

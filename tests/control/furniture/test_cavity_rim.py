@@ -9,7 +9,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.cavity_rim import supporting_level, seen_rim
+from manipose_mj.control.furniture.cavity_rim import seen_rim, supporting_level
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
