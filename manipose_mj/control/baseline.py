@@ -22,7 +22,7 @@ from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
-from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
+from manipose_mj.control.planning.plan_articulated import parts_to_look_behind, stand_wrong
 from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
@@ -37,6 +37,7 @@ MAX_PLANS = 5
 MAX_LOOKS = 6  # into what was opened, where furniture is estimated
 MAX_FAILED_MOVES = 30  # the same in clutter, where each move is a plan
 _AT_END = 0.5  # after the last step [s]
+_LED_ON = 0.08  # of its range, by which a part has moved that a plan has led on
 _WORTH_ANOTHER_PLAN = ("grasp", "plan", "motion")
 
 
@@ -51,8 +52,22 @@ class _Progress:
         """Something was set down."""
         self.failures_here, self._last = 0, ""
 
+    def led_on(self, before: SceneEstimate, after: SceneEstimate) -> None:
+        """A plan failed: where it has moved a part, what failed before may do now."""
+        shares = [{p.name: _share_open(p) for p in each.parts.values()} for each in (before, after)]
+        if any(abs(shares[1][name] - share) > _LED_ON for name, share in shares[0].items()):
+            self.failures_here = (
+                -1
+            )  # with the failure that is about to be counted: the first plan again
+
     def failed_again(self, plan: Plan, estimate: SceneEstimate, *, counts: bool) -> bool:
-        """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since."""
+        """Count a failure, if it `counts`; whether it is of the plan that failed before, with nothing opened since.
+
+        Args:
+          plan: That failed.
+          estimate: With which it was made.
+          counts: Whether the failure counts.
+        """
         self.failures_here += counts
         openings = {part.name: round(_share_open(part), 1) for part in estimate.parts.values()}
         text = f"{plan_to_json(plan)} {openings}"
@@ -179,7 +194,7 @@ class Baseline:
                 elif not (step_by_step and plan):
                     self.status = "done"
                     yield from executor.wait(_AT_END)
-                    if step_by_step or not self._falls_short():
+                    if step_by_step or not self._falls_short(executor):
                         return
                     falls_short = True
                     primitives.avoid_last_grasps()
@@ -192,7 +207,9 @@ class Baseline:
                 most = MAX_FAILED_MOVES if step_by_step else plans
                 # In clutter the same plan may be carried out another way.
                 counts = acted or not step_by_step
-                same = progress.failed_again(plan, executor.observe(), counts=counts)
+                if scene.perception.feels_joints and counts and not falls_short:
+                    progress.led_on(estimate, executor.observe())
+                same = progress.failed_again(plan, estimate, counts=counts)
                 exhausted = (same and not step_by_step) or failures == most
                 mends = (*_WORTH_ANOTHER_PLAN, "release") if step_by_step else _WORTH_ANOTHER_PLAN
                 if exhausted or (failure.stage not in mends and not falls_short):
@@ -202,12 +219,12 @@ class Baseline:
                 candidates = None
                 yield from self._recover(executor, primitives, planner, failure, step_by_step)
 
-    def _falls_short(self) -> bool:
-        """Whether goals are not met, as far as true poses tell; estimates leave it open."""
-        if self._pose != "oracle" or self._errors != UNPERTURBED:
-            return False
+    def _falls_short(self, executor: Executor) -> bool:
+        """Whether goals are not met, as far as true poses tell; where poses are estimated, as far as parts do."""
         task, physics = self._environment.task, self._environment.physics
         assert isinstance(task, ManipulationTask)
+        if self._pose != "oracle" or self._errors != UNPERTURBED:
+            return executor.feels_joints and stand_wrong(task.goals, executor.observe())
         return not task.succeeded(physics)
 
     def _carry_out(

@@ -16,6 +16,7 @@ from jaxtyping import Float, PRNGKeyArray
 
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated.model import ArticulatedModel, estimate_furniture
+from manipose_mj.ppf_jax.compilation_cache import keep_compiled
 from manipose_mj.ppf_jax.data.articulated.clouds import CLOUD_POINTS
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
@@ -73,6 +74,7 @@ class ArticulatedEstimator:
                 f"no weights for furniture at {path}; train some with "
                 "`manipose pose train-articulated` and read them with ArticulatedEstimator.from_file"
             )
+        keep_compiled()
         return _read_once(path)
 
     @classmethod

@@ -17,6 +17,7 @@ from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, pose_error
+from manipose_mj.ppf_jax.compilation_cache import keep_compiled
 from manipose_mj.ppf_jax.confidence import (
     NEAR,
     Calibration,
@@ -71,6 +72,7 @@ class PoseEstimator:
             raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
         stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
         folder = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
+        keep_compiled()
         for stem in stems:
             if (folder / f"{stem}.npz").is_file():
                 return cls(_read_once(folder / f"{stem}.npz"), calibration_in(folder))

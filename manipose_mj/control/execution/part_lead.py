@@ -96,7 +96,7 @@ def _way(
     if abs(beyond - part.opening) < 0.01:
         return None
     way = way_in_hand(planner, estimate, part, beyond, _HELD)
-    return None if way is None else ending_free(planner, part, way)
+    return None if way is None else ending_free(planner, part, way, _HELD)
 
 
 def _follow(executor: Executor, way: PartWay, trace: _Trace) -> Iterator[Action]:

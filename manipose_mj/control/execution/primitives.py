@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.execution.part_lead import lead_part
+from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     ending_free,
@@ -32,10 +35,10 @@ from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.scene.cavity_mouth import way_out
 from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
-from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
-from manipose_mj.poses import invert, rotation_angle
+from manipose_mj.poses import invert
 
 # Past this the object in the hand is not where the grasp put it.
 _LOST_DISTANCE = 0.04
@@ -48,12 +51,14 @@ _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
+_IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
+_UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
 _GIVING_WAY = (0.006, 0.012)
 
 
@@ -79,6 +84,7 @@ class Primitives:
         # `T_tcp_label` of grasps that did not hold or led nowhere, and of those objects were last released from.
         self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
+        self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
 
     @property
     def held(self) -> str | None:
@@ -110,7 +116,7 @@ class Primitives:
             yield from self._let_go(planner, name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
         self._executor.hold(name)
-        self._held = _Held(name, pick, _pose_in_hand(estimate, name))
+        self._held = _Held(name, pick, pose_in_hand(estimate, name))
 
     def move_to(self, planner: MotionPlanner, step: Step) -> Actions:
         """Bring what is held to its destination."""
@@ -184,12 +190,13 @@ class Primitives:
         yield from self._executor.follow(free)
         estimate, planner = self._observe(planner)
         now = self._check_held(estimate, name)
-        if _moved(pose_tcp, now, _SLIP):
+        slip = slip_of(estimate, name, now, pose_tcp)
+        if exceeds(slip, _SLIP):
             again = _placed_again(planner, estimate, step, now)
             if again is not None:
                 free, place = again
                 yield from self._executor.follow(free)
-            elif _moved(pose_tcp, now, _BIG_SLIP):
+            elif exceeds(slip, _BIG_SLIP):
                 raise StageFailure("plan", f"{name} slipped, no way to set it down as it is now")
         yield from self._executor.follow(place.descent)
 
@@ -202,7 +209,7 @@ class Primitives:
         if self._executor.feels_joints:
             yield from lead_part(self._executor, planner, step.subject, step.opening)
             self._held = replace(
-                self._held, pose_tcp=_pose_in_hand(self._executor.observe(), step.subject)
+                self._held, pose_tcp=pose_in_hand(self._executor.observe(), step.subject)
             )
             return
         way = way_in_hand(planner, estimate, part, step.opening)
@@ -229,7 +236,7 @@ class Primitives:
         """
         part = self._executor.observe().parts[name]
         span = float(np.ptp(part.joint.range))
-        for _ in range(1 if self._executor.feels_joints else _PUSHES):
+        for _ in range(_PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
                 return
             yield from self._push_once(planner, name, opening)
@@ -245,19 +252,28 @@ class Primitives:
         part = estimate.parts[name]
         beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
         aim = opening - beyond if opening <= part.joint.range[0] else opening
-        push = push_part(planner, estimate, part, aim)
+        push = push_part(planner, estimate, part, aim, self._in_vain.get(name, ()))
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
         self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
+        gone = abs(estimate.parts[name].opening - part.opening)
+        if gone < _IN_VAIN * abs(opening - part.opening) and isinstance(push.way.hold, Push):
+            self._in_vain.setdefault(name, []).append(push.way.hold)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:
             yield from self._executor.follow(back)
         # Fingers that caught on something are still there.
         estimate, planner = self._observe(planner)
-        if planner.collides(estimate.joints, CollisionQuery(GRAZING)):
+        if not planner.collides(estimate.joints, CollisionQuery(GRAZING)):
+            return
+        try:
             yield from self._executor.follow(_retreat(planner, estimate, name))
+        except StageFailure:
+            # Back as the hand came: the part does not follow it.
+            yield from self._executor.follow(push.way.targets(self._executor.timestep)[::-1])
+            yield from self._executor.follow(push.approach[::-1])
 
     def _push_object(self, planner: MotionPlanner, step: Step) -> Actions:
         """With closed fingers, over the table, then up."""
@@ -287,9 +303,8 @@ class Primitives:
           StageFailure: It is no longer where the grasp had it.
         """
         assert self._held is not None
-        now, then = _pose_in_hand(estimate, name), self._held.pose_tcp
-        moved = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
-        turned = float(rotation_angle(now[:3, :3], then[:3, :3]))
+        now, then = pose_in_hand(estimate, name), self._held.pose_tcp
+        moved, turned = slip_of(estimate, name, now, then)
         # A handle may slide along its bar and turn about it; what counts there is the joint.
         is_part = name in estimate.parts
         if moved > _LOST_DISTANCE or (turned > _LOST_ANGLE and not is_part):
@@ -318,10 +333,15 @@ def retraction_of(
 def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
     """How far to open [m]: as far as neighbours allow."""
     released = estimate.parts.get(name) or estimate.objects[name]
-    for margin in _LETTING_GO:
+    margins = _LETTING_GO
+    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released.geoms)
+    if name in estimate.objects and estimate.objects[name].uncertainty > 0:
+        # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
+        margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
+        query = planner.excusing(estimate.joints, query)
+    for margin in margins:
         opening = min(estimate.opening + margin, MAX_OPENING)
-        query = CollisionQuery(replace(CONTACT, arm=0.0), opening=opening, target=released.geoms)
-        if not planner.collides(estimate.joints, query):
+        if not planner.collides(estimate.joints, replace(query, opening=opening)):
             return opening
     return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
 
@@ -343,9 +363,9 @@ def _retreat(
     released = estimate.parts.get(name) or estimate.objects[name]
     distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
     touched = frozenset({planner.body_name(released.body)})
-    for allowance in (planner.contact_allowance, *_GIVING_WAY):
+    for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
         pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances, near)
+        line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
         if line is not None:
             return line
     raise StageFailure("release", f"no way to back off from {name}")
@@ -378,18 +398,3 @@ def _placed_again(
     query = estimate.in_hand(step.subject).query()
     free = planner.free_path(estimate.joints, place.above, query)
     return None if free is None else (free, place)
-
-
-def _pose_in_hand(estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
-    """`T_tcp_label` of an object, or of a part's handle."""
-    part: PartEstimate | None = estimate.parts.get(name)
-    pose = estimate.objects[name].label_pose if part is None else part.handle_pose
-    return invert(estimate.tcp_pose) @ pose
-
-
-def _moved(
-    a: Float[np.ndarray, "4 4"], b: Float[np.ndarray, "4 4"], limit: tuple[float, float]
-) -> bool:
-    """Whether an object has slipped in the hand by more than a distance [m] or an angle [rad]."""
-    shift = float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
-    return shift > limit[0] or float(rotation_angle(a[:3, :3], b[:3, :3])) > limit[1]

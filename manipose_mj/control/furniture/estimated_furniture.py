@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,6 +67,9 @@ class EstimatedFurniture:
         self._mask = 0
         self._held: _Held | None = None
         self._moved: set[str] = set()
+        self._before: dict[
+            str, float
+        ] = {}  # openings of parts that were pushed and not looked at since
 
     def reset(self, key: Any) -> None:
         """Look at the furniture of the episode.
@@ -74,7 +77,7 @@ class EstimatedFurniture:
         Raises:
           StageFailure: No part is found that a goal could mean.
         """
-        self.model, self._held, self._moved = None, None, set()
+        self.model, self._held, self._moved, self._before = None, None, set(), {}
         for category, mask in self._task.furniture_masks:
             self._mask = mask
             seen = self._cloud(self._front_cameras)
@@ -171,9 +174,10 @@ class EstimatedFurniture:
             return
         touched = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
         if touched:
-            points = self._points()
+            points, hidden = self._points(), self._hidden()
             for part in touched:
-                opening = found_opening(part, points)
+                before = self._before.pop(part.name, None)
+                opening = found_opening(part, points, hidden, before)
                 self.model = self.model.with_part(part.at(opening)) if self.model else None
         self._moved = {
             part.name for part in touched if self._near(part, tcp_pose)
@@ -209,6 +213,7 @@ class EstimatedFurniture:
         """The hand pushed a part to about this opening [m or rad]."""
         part = self._part(name)
         if part is not None and self.model is not None:
+            self._before[name] = part.opening
             self.model = self.model.with_part(part.at(max(opening, 0.0)))
             self._moved.add(name)
 
@@ -221,7 +226,7 @@ class EstimatedFurniture:
         points = transform(invert(model.pose), cloud.points)
         for part in model.parts:
             if part.opening > 0.0:
-                found = part.at(found_opening(part, points))
+                found = part.at(found_opening(part, points, self._hidden()))
                 # What does not show stays as it is usual: nobody need look again.
                 model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
         self.model = model
@@ -240,6 +245,17 @@ class EstimatedFurniture:
 
     def _cloud(self, cameras: tuple[str, ...] | None = None) -> SceneCloud:
         return self._views.cloud(self._physics, self._mask, cameras=cameras)
+
+    def _hidden(self) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
+        """Which points, object frame [m], no camera can see now."""
+        assert self.model is not None
+        pose, sights = self.model.pose, self._views.sights(self._physics)
+
+        def hidden(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+            placed = transform(pose, points)
+            return ~np.any([sight.reaches(placed) for sight in sights], axis=0)
+
+        return hidden
 
     def _points(self) -> Float[np.ndarray, "n 3"]:
         assert self.model is not None

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
+from manipose_mj.control.furniture.cavity_rim import seen_rim, supporting_level
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import invert, transform
@@ -15,6 +16,9 @@ from manipose_mj.poses import invert, transform
 # Open so far, a part shows what is behind it [m, rad].
 _TELLING = {"slide": 0.10, "hinge": 0.7}
 _PLANE = 0.010  # how far points of a panel are from its plane [m]
+# Of a door from its front, backwards and forwards [m]; share of a door's sides that has to show to tell them.
+_DOOR_PLANE, _MOST_OF_DOOR = (0.05, 0.02), 0.7
+_AT_HINGE = 0.04  # a side that is no further from the hinge is the hinge's [m]
 _BEYOND = 0.08  # by how much a panel may be larger than was guessed [m]
 _FLAT, _FACING = 0.8, 0.75  # cosines of normals to an axis
 _LEAST = 25  # points that tell a side
@@ -22,6 +26,8 @@ _BIN = 0.005  # [m]
 _SIDE_MARGIN = 0.004  # kept off sides that were measured [m]
 _UNSEEN = 0.02  # and off those that were not, from the panel's edges [m]
 _ROOF = 0.015  # below the panel's upper edge [m]
+_BEHIND_MOUTH = 0.06  # from where on what faces the front is no frame [m]
+_RIM_ROOF = 0.006  # kept off a roof that was measured [m]
 
 
 def seen_open(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
@@ -74,7 +80,8 @@ def _door(
     points: Float[np.ndarray, "n 3"],
     normals: Float[np.ndarray, "n 3"],
 ) -> PartModel:
-    """From what shows through the opening."""
+    """From what shows through the opening, and of the door itself."""
+    measured = replace(part, panel=_door_panel(part, points, normals))
     low, high = part.panel
     front = high[0]
     inside = points[:, 0] < front - 0.025
@@ -82,19 +89,49 @@ def _door(
         inside &= (points[:, axis] > low[axis] - 0.01) & (points[:, axis] < high[axis] + 0.01)
     inside &= points[:, 0] > model.solid[:, 0, 0].min() + 0.006
     if inside.sum() < 4 * _LEAST:
-        return part
+        return measured
     floor, left, right = _floor_and_sides(points, normals, inside, part.panel)
-    # The rear: where most points look out of the front.
-    facing = inside & (normals[:, 0] > _FACING)
+    below = inside & (points[:, 2] < (low[2] + 2 * high[2]) / 3)
+    supporting = supporting_level(points, below, normals)
+    floor = floor if supporting is None else supporting + 0.001
+    rim = seen_rim(points, normals, part.panel)
+    left = left if rim.left is None else max(left, rim.left + _SIDE_MARGIN)
+    right = right if rim.right is None else min(right, rim.right - _SIDE_MARGIN)
+    roof = high[2] - max(_ROOF, 0.02) if rim.roof is None else rim.roof - _RIM_ROOF
+    mouth = front - 0.018 if rim.mouth is None else rim.mouth
+    # The rear: where most points look out of the front, those of the frame around the opening left out.
+    behind = inside & (points[:, 0] < mouth - _BEHIND_MOUTH)
+    facing = behind & (normals[:, 0] > _FACING)
     rear = float(np.percentile(points[inside, 0], 3))
     if facing.sum() >= _LEAST:
         rear = _mode(points[facing, 0]) + 0.004
     hole_low = np.array([rear, left, floor])
-    hole_high = np.array([front - 0.018, right, high[2] - max(_ROOF, 0.02)])
+    hole_high = np.array([mouth, right, roof])
     if (hole_high - hole_low < 0.05).any():
-        return part
+        return measured
     cavity = Cavity((hole_low + hole_high) / 2, hole_high - hole_low, moves_with_part=False)
-    return replace(part, part=replace(part.part, cavity=cavity), seen_inside=True)
+    return replace(measured, part=replace(part.part, cavity=cavity), seen_inside=True)
+
+
+def _door_panel(
+    part: PartModel, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """Where a door that is open ends, from the points of either side of it."""
+    back = invert(part.motion(part.opening))
+    shut, turned = transform(back, points), normals @ back[:3, :3].T
+    low, high = part.panel
+    on = (shut[:, 0] > high[0] - _DOOR_PLANE[0]) & (shut[:, 0] < high[0] + _DOOR_PLANE[1])
+    on &= np.abs(turned[:, 0]) > _FACING
+    on &= ((shut > low - _PLANE) & (shut < high + _PLANE))[:, 1:].all(axis=1)
+    if on.sum() < 8 * _LEAST:
+        return part.panel
+    ends = np.percentile(shut[on, 1:], [0.7, 99.3], axis=0)
+    if (np.ptp(ends, axis=0) < _MOST_OF_DOOR * (high - low)[1:]).any():
+        return part.panel  # something hides much of it
+    # On the side of the hinge the body bleeds into it.
+    hinge = np.abs(part.panel[:, 1:] - part.part.joint.origin[1:]) < _AT_HINGE
+    across = np.abs(part.part.joint.axis[1:]) < _FACING
+    return np.column_stack([part.panel[:, 0], np.where(hinge & across, part.panel[:, 1:], ends)])
 
 
 def _measured_panel(

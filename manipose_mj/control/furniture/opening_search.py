@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
 from manipose_mj.control.furniture.furniture_model import PartModel
@@ -17,17 +19,32 @@ _BETTER = 0.85  # of the misfit that is left, for another opening to replace the
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESS = 0.018  # of a panel, whose other side may be all that shows [m]
 _SEEN = 0.75  # share of the points that has to be seen at best: some are hidden
+_HIDDEN = (
+    0.5  # a point that nobody can see counts as so far, as a share of what is far: it tells nothing
+)
 _MOST = 300
 
 
-def found_opening(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float:
+Hidden = Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]
+
+
+def found_opening(
+    part: PartModel,
+    points: Float[np.ndarray, "n 3"],
+    hidden: Hidden | None = None,
+    before: float | None = None,
+) -> float:
     """The opening [m or rad] near the present one that fits best; the present one where none is clearly better.
 
-    A door that stands wide open hardly shows; what it shut then looks much like it, shut.
+    A door that stands wide open hardly shows; what it shut then looks much like it, shut. And what the arm hides tells
+    nothing: a door behind it is not gone.
 
     Args:
       part: With its looks.
       points: Of the furniture now, object frame [m].
+      hidden: Which points, object frame [m], no camera can see for what is in front of them; None: nobody knows.
+      before: An opening that the part had before somebody tried to move it to the present one: it may be anywhere in
+        between.
     """
     looks = part.looks[:_MOST]
     if len(looks) < 20 or len(points) < 50:
@@ -39,16 +56,20 @@ def found_opening(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float:
 
     def misfit(opening: float) -> float:
         motion = part.motion(opening)
-        off = [
-            np.minimum(tree.query(transform(motion, each), distance_upper_bound=_FAR)[0], _FAR)
-            for each in sides
-        ]
-        nearest = np.sort(np.min(off, axis=0))
+        moved = [transform(motion, each) for each in sides]
+        off = np.min(
+            [np.minimum(tree.query(p, distance_upper_bound=_FAR)[0], _FAR) for p in moved], axis=0
+        )
+        if hidden is not None:
+            unseen = np.all([hidden(p) for p in moved], axis=0)
+            off = np.where(unseen, np.minimum(off, _HIDDEN * _FAR), off)
+        nearest = np.sort(off)
         return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
 
     coarse, fine = _STEPS[kind]
-    least = max(part.opening - _WITHIN[kind], 0.0)
-    most = min(part.part.joint.range[1] + _BEYOND[kind], part.opening + _WITHIN[kind])
+    ends = [part.opening, part.opening if before is None else before]
+    least = max(min(ends) - _WITHIN[kind], 0.0)
+    most = min(part.part.joint.range[1] + _BEYOND[kind], max(ends) + _WITHIN[kind])
     tried = [*np.arange(least, most, coarse).tolist(), part.opening]
     best = min(tried, key=misfit)
     near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()

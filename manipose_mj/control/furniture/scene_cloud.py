@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from dm_control import mjcf
 from dm_control.composer.observation.observable import Observable
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from manipose_mj.mjcf.cameras.depth_normals import depth_normals
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
-from manipose_mj.poses import transform
+from manipose_mj.poses import invert, transform
+
+_IN_FRONT = 0.03  # what is that much nearer to a camera hides what is behind it [m]
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,28 @@ class SceneCloud:
         """The points of one instance."""
         rows = self.instance == instance
         return SceneCloud(self.points[rows], self.normals[rows], self.instance[rows])
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How far one camera sees. Attributes: depth `(h, w)` [m], 0 where nothing was measured; intrinsics; pose: `T_world_camera`."""
+
+    depth: Float[np.ndarray, "h w"]
+    intrinsics: Intrinsics
+    pose: Float[np.ndarray, "4 4"]
+
+    def reaches(self, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+        """Which points, world frame [m], it would see if they were there: nothing is in front of them."""
+        local, k = transform(invert(self.pose), points), self.intrinsics
+        z = np.maximum(local[:, 2], 1e-6)
+        column = np.floor(local[:, 0] / z * k.fx + k.cx + 0.5)
+        row = np.floor(local[:, 1] / z * k.fy + k.cy + 0.5)
+        inside = (local[:, 2] > 0) & (column >= 0) & (column < self.depth.shape[1])
+        inside &= (row >= 0) & (row < self.depth.shape[0])
+        measured = self.depth[row[inside].astype(int), column[inside].astype(int)]
+        reached = np.zeros(len(points), bool)
+        reached[inside] = (measured > 0) & (measured > z[inside] - _IN_FRONT)
+        return reached
 
 
 class SceneViews:
@@ -87,6 +111,15 @@ class SceneViews:
                 directions.append(np.zeros((len(pixels), 3)))
         found = np.concatenate(points)
         return SceneCloud(found, np.concatenate(directions), np.full(len(found), instance))
+
+    def sights(self, physics: mjcf.Physics) -> tuple[Sight, ...]:
+        """How far every camera sees."""
+        found = []
+        for camera in self.cameras:
+            depth = self._read(physics, f"depth/{camera}")
+            k = _intrinsics(self._read(physics, f"camera/{camera}/intrinsics"), depth.shape)
+            found.append(Sight(depth, k, self.camera_pose(physics, camera)))
+        return tuple(found)
 
     def _read(self, physics: mjcf.Physics, key: str) -> np.ndarray:
         return np.asarray(self._observables[key](physics))

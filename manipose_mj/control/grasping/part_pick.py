@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,7 @@ _AJAR = 0.5  # of a door, enough to reach behind it [rad]
 # A way that ends sooner is worth it where none goes on: the hand takes hold again from there [m or rad].
 _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
+_ALIKE = 0.03  # between pushes that meet a part at nearly the same place [m]
 _MAX_PUSHES = 24  # for which a way is looked for
 _MAX_TRIES = 12  # complete ways for which an approach is looked for
 
@@ -146,15 +147,20 @@ def way_in_hand(
 
 
 def push_part(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    opening: float,
+    in_vain: Sequence[Push] = (),
 ) -> PartPush:
-    """A push with closed fingers that moves the part all the way.
+    """A push with closed fingers that moves the part all the way; none near those that were made in vain.
 
     Raises:
       StageFailure: There is none.
     """
     complete = tried = 0
     holds = list(_pushes(planner, part, opening))
+    holds = [hold for hold in holds if not any(_alike(hold, other) for other in in_vain)]
     holds.sort(key=lambda hold: -promise(part, hold, opening))
     for hold in holds[:_MAX_PUSHES]:
         tried += 1
@@ -163,7 +169,8 @@ def push_part(
             continue
         complete += 1
         start_tilt = float(way.tilts[0])
-        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], hold.opening):
+        query = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
+        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], query):
             free_path = planner.free_path(
                 estimate.joints, line[-1], CollisionQuery(opening=hold.opening)
             )
@@ -177,11 +184,16 @@ def push_part(
     )
 
 
-def ending_free(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> PartWay | None:
-    """As much of a grip's way as leads to where the open hand can back off; None if nowhere."""
+def ending_free(
+    planner: MotionPlanner, part: PartEstimate, way: PartWay, clearance: Clearance = APPROACH
+) -> PartWay | None:
+    """As much of a grip's way as leads to where the open hand can back off; None if nowhere.
+
+    `clearance` is how near it may be to the part and to what is around it then.
+    """
     for count in range(len(way.openings), 1, -_STEP_BACK):
         shorter = PartWay(way.hold, way.joints[:count], way.openings[:count], way.tilts[:count])
-        if _can_get_off(planner, part, shorter):
+        if _can_get_off(planner, part, shorter, clearance):
             return shorter
     return None
 
@@ -189,15 +201,25 @@ def ending_free(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> Par
 def off_surface(
     planner: MotionPlanner, part: PartEstimate, way: PartWay, joints: Float[np.ndarray, "7"]
 ) -> Float[np.ndarray, "t 7"] | None:
-    """Joint targets away from what was pushed, from where the push ended."""
+    """Joint targets away from what was pushed, from where the push ended; out of what estimates have the hand in."""
     assert isinstance(way.hold, Push)
-    return next(_lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, None), None)
+    usual = CollisionQuery(CONTACT, target=part.geoms)
+    for query in (usual, planner.excusing(joints, usual)):
+        for line in _lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, query):
+            return line
+    return None
 
 
 def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Iterator[Push]:
     if opening < part.opening:
         return shutting_pushes(planner, part)
     return opening_pushes(planner, part)
+
+
+def _alike(one: Push, other: Push) -> bool:
+    """Whether two pushes meet a part at nearly the same place."""
+    near = float(np.linalg.norm(one.point - other.point)) < _ALIKE
+    return near and one.flat == other.flat and float(one.normal @ other.normal) > 0.9
 
 
 def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:
@@ -223,11 +245,14 @@ def _turned(way: PartWay) -> float:
     return float(np.abs(np.diff(way.joints, axis=0)).max(axis=1).sum() + 0.5 * abs(way.tilts[0]))
 
 
-def _can_get_off(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
+def _can_get_off(
+    planner: MotionPlanner, part: PartEstimate, way: PartWay, clearance: Clearance
+) -> bool:
     """Whether the open hand can back off from the handle at the end."""
     opening = way.hold.opening_before
     at_end = planner.within(with_part_at(planner.scene, part, float(way.openings[-1])))
-    back = _backwards(at_end, part, way.joints[-1], opening, (HANDLE_RETREATS[-1],))
+    standoffs = (HANDLE_RETREATS[-1],)
+    back = _backwards(at_end, part, way.joints[-1], opening, standoffs, clearance)
     return back is not None
 
 
@@ -237,10 +262,11 @@ def _backwards(
     joints: Float[np.ndarray, "7"],
     opening: float,
     standoffs: tuple[float, ...],
+    clearance: Clearance = APPROACH,
 ) -> Float[np.ndarray, "t 7"] | None:
     """A straight approach along the hand's own axis, which ends at `joints`."""
     touched = frozenset({planner.body_name(part.body)})
-    query = CollisionQuery(APPROACH, opening=opening, target=part.geoms)
+    query = CollisionQuery(clearance, opening=opening, target=part.geoms)
     for standoff in standoffs:
         goal = planner.backed_off(joints, standoff)
         back = planner.line(joints, goal, query, touched=touched)
@@ -255,11 +281,10 @@ def _lines_off(
     hold: Push,
     tilt: float,
     joints: Float[np.ndarray, "7"],
-    opening: float | None,
+    query: CollisionQuery,
 ) -> Iterator[Float[np.ndarray, "t 7"]]:
     """Straight lines off the surface, the part where the scene has it."""
-    touched = frozenset({planner.body_name(part.body)})
-    query = CollisionQuery(CONTACT, opening=opening, target=part.geoms)
+    touched = frozenset({planner.body_name(part.body)}) | planner.ignored(query)
     pose = part.base_pose @ joint_motion(part, part.opening)
     for away, back in _PUSH_STANDOFFS:
         goal = pose @ shifted(hold, away).tcp_poses(np.array([tilt]))[0]

@@ -24,6 +24,7 @@ def retreat(
     touched: frozenset[str],
     distances: Sequence[float] = RETREATS,
     near: float | None = None,
+    excused: bool = False,
 ) -> Float[np.ndarray, "t 7"] | None:
     """Joint targets straight back, or else up, to where the next motion has room if there is such a place.
 
@@ -34,11 +35,15 @@ def retreat(
       touched: Names of bodies that it touches.
       distances: To try, the best first [m].
       near: How near the hand may be to what was released, negative for touching [m]; None: as is usual.
+      excused: Where the scene has the robot in something from the start, as estimates may, it need but get no deeper in.
     """
     clearance = replace(CONTACT, arm=0.0)
     if near is not None:
         clearance = replace(clearance, target=near, arm=near / 2)
     query = CollisionQuery(clearance, target=released)
+    if excused:
+        query = planner.excusing(estimate.joints, query)
+        touched = touched | planner.ignored(query)
     back = (planner.backed_off(estimate.joints, distance) for distance in distances)
     up = (planner.raised(estimate.joints, distance) for distance in distances)
     for ways in (back, up):

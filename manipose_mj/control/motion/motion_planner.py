@@ -25,6 +25,7 @@ _CHECK_EVERY = 4
 _CHECK_RESOLUTION = 0.02  # of free paths, in any joint [rad]
 # From its support on which an attached object must be free [m].
 _SUPPORT_DISTANCE = 0.02
+_EXCUSED = 0.001  # how much deeper a robot may be than at the start, in what it starts in [m]
 _SPEED_SHARES = (1.0, 0.5, 0.25)
 _TIMING = Timing()
 _LINE = LineConfig()
@@ -90,6 +91,24 @@ class MotionPlanner:
         """Whether the arm, with what is attached, is too close to anything."""
         return self.scene.in_collision(joints, self._allowing(query))
 
+    def excusing(self, joints: Float[np.ndarray, "7"], query: CollisionQuery) -> CollisionQuery:
+        """The same question for a motion that starts in a configuration [rad] in which the robot is, collision or not.
+
+        It may be as deep in anything as it is there, so that it can get out.
+        """
+        depths = self.scene.depths(joints, self._allowing(query))
+        return replace(query, depths=np.where(depths > 0, depths + _EXCUSED, 0.0))
+
+    def ignored(self, query: CollisionQuery) -> frozenset[str]:
+        """Names of the bodies that the way of a straight line does not keep away from, for it is checked afterwards.
+
+        None, but where a question excuses the robot for being in something: there nothing could be kept away from.
+        """
+        if query.depths is None or not query.depths.any():
+            return frozenset()
+        model = self.arm.model
+        return frozenset(model.body(body).name for body in range(model.nbody))
+
     def obstacles(
         self, joints: Float[np.ndarray, "7"], query: CollisionQuery
     ) -> Bool[np.ndarray, "ngeom"]:
@@ -106,7 +125,7 @@ class MotionPlanner:
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
-        Keeps as far from everything as the start allows.
+        Keeps as far from everything as the start allows; out of what a scene has the robot in, it leads no deeper in.
 
         Args:
           start: A configuration [rad].
@@ -117,6 +136,8 @@ class MotionPlanner:
         query = query or CollisionQuery()
         if self.collides(goal, query.keeping(GRAZING if tight else TRANSIT)):
             return None
+        if self._is_here(start) and self.collides(start, query.keeping(GRAZING)):
+            query = self.excusing(start, query.keeping(GRAZING))
         for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
             widely = query.keeping(wide)
             if self.collides(start, widely) or (tight and self.collides(goal, widely)):
@@ -173,6 +194,11 @@ class MotionPlanner:
             if self.scene.in_collision(q, later if gone > _SUPPORT_DISTANCE else at_start):
                 return None
         return targets
+
+    def _is_here(self, joints: Float[np.ndarray, "7"]) -> bool:
+        """Whether the arm was observed in this configuration [rad]."""
+        addresses = self.scene.collision_model.arm_addresses
+        return bool(np.abs(self.scene.positions.qpos[addresses] - joints).max() < 1e-6)
 
     def _allowing(self, query: CollisionQuery) -> CollisionQuery:
         return replace(

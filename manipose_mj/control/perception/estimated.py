@@ -64,6 +64,10 @@ _TRUSTED = (
 _AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
 _BETTER = 0.9  # of the misfit that is left, for another pose to replace it
+# How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
+# they lose it [m].
+_IN_HAND = (0.03, 0.5)
+_LOST = 0.004
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,7 @@ class EstimatedPerception:
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
+        self._held_width = 0.0  # of the gripper then [m]
         self._time = -1.0
         self._keys = _keys(0)
         self.sources: Mapping[str, str] = {
@@ -220,6 +225,7 @@ class EstimatedPerception:
         self._world.hold(name, tcp)
         if name in self._known:
             self._held = (name, invert(tcp) @ self._known[name].pose)
+            self._held_width = self.robot()[1]
 
     def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
         """The hand led a part along this path, world frame [m]; `stopped`: it went no further."""
@@ -255,9 +261,15 @@ class EstimatedPerception:
         sensed = self._sensed(name, views, (before.shape,))
         if sensed is None or sensed.misfit > _BETTER * misfit:
             return before
+        if held and not self._may_be_lost() and not _nearly(sensed, before):
+            return before
         if self._held is not None and held:
             self._held = (name, invert(tcp) @ sensed.pose)
         return sensed
+
+    def _may_be_lost(self) -> bool:
+        """Whether the fingers have closed on what they held: friction lets nothing jump that they are still around."""
+        return self.robot()[1] < self._held_width - _LOST
 
     def _sensed(
         self, name: str, views: tuple[ObjectView, ...], shapes: tuple[KnownShape, ...]
@@ -313,6 +325,12 @@ class EstimatedPerception:
             category=self._categories()[name],
             uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
         )
+
+
+def _nearly(sensed: SensedPose, before: SensedPose) -> bool:
+    """Whether two poses differ by no more than an object slips in the hand."""
+    shift, turn = pose_error(sensed.pose, before.pose, before.shape.label.symmetry)
+    return bool(shift < _IN_HAND[0] and turn < _IN_HAND[1])
 
 
 def _load(category: str) -> Estimator:

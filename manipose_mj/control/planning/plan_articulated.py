@@ -33,6 +33,8 @@ OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
 AJAR = 0.3  # from which on a door can be pushed from inside [rad]
 SHUT_ENOUGH = 0.005  # of a joint [m or rad]
+# From which openings on a part that is estimated stands otherwise than it should: of its range, [m or rad].
+NOT_OPEN, NOT_SHUT = 0.08, {"slide": 0.012, "hinge": 0.05}
 CAVITY_MARGIN = np.array([0.010, 0.010, 0.004])  # in all, along each axis [m]
 # Where in the cavity, as a share of the free way from its middle to its front: the hand that sets
 # something down needs room in front of what is above, or beside, or both.
@@ -73,8 +75,8 @@ def part_goal_plans(
             yield ()
             return
         yield (Step("move_to", goal.part, opening=low),)
-        # What no push shuts is led by its handle.
-        yield _led(goal.part, low)
+        # What no push shuts is led by its handle, and then pushed on from where the hand can lead it no further.
+        yield (*_led(goal.part, low), Step("move_to", goal.part, opening=low))
     elif isinstance(goal, OpenGoal):
         share = max(OPEN_SHARE, min((1 + goal.fraction) / 2, 1.0))
         is_open = part.opening >= low + goal.fraction * (high - low)
@@ -104,6 +106,25 @@ def parts_to_look_behind(goals: tuple[Goal, ...], estimate: SceneEstimate) -> tu
         if isinstance(goal, InsideGoal | TakenOutGoal)
         and (goal.object not in estimate.objects or not estimate.parts[goal.part].cavity_seen)
     )
+
+
+def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
+    """Whether a part is seen to stand otherwise than a goal has it."""
+    for goal in goals:
+        if not isinstance(goal, OpenGoal | ShutGoal):
+            continue
+        part = estimate.parts[goal.part]
+        low, high = part.joint.range
+        share = (part.opening - low) / (high - low)
+        if isinstance(goal, OpenGoal):
+            wrong = share < float(goal.fraction) - NOT_OPEN
+        elif goal.fraction is not None:
+            wrong = share > 1 - float(goal.fraction)
+        else:
+            wrong = part.opening - low > NOT_SHUT[part.joint.kind]
+        if wrong:
+            return True
+    return False
 
 
 def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:

@@ -100,6 +100,7 @@ class CollisionQuery:
         contact [m].
       support_allowance: How much nearer the gripper may come to what is fixed, such as the table, where the
         clearance allows contact [m].
+      depths: How deep the robot may be in each geom, whatever the clearance, `(ngeom,)` [m]; None: in none.
     """
 
     clearance: Clearance = TRANSIT
@@ -108,6 +109,7 @@ class CollisionQuery:
     attached: AttachedObject | FixedObject | None = None
     contact_allowance: float = 0.0
     support_allowance: float = 0.0
+    depths: Float[np.ndarray, "ngeom"] | None = None
 
     def keeping(self, clearance: Clearance) -> CollisionQuery:
         """The same question with another clearance."""

@@ -112,6 +112,28 @@ class PlanningScene:
             hit[second] |= both or not moving[second]
         return hit
 
+    def depths(
+        self, joints: Float[np.ndarray, "7"], query: CollisionQuery
+    ) -> Float[np.ndarray, "ngeom"]:
+        """How deep the robot is in each geom that it is too close to [m]; zero in the others.
+
+        A robot that is where it is cannot be in what is solid: estimates have put that too near. All geoms of a body
+        count as one, for they are off together; those of the world are bodies of their own.
+        """
+        contacts = self.collision_model.contacts(self.positions, joints, query)
+        bad = contacts.distances < self._allowed(contacts, query)
+        depths = np.zeros(len(self.robot))
+        for (first, second), distance in zip(
+            contacts.geoms[bad].tolist(), contacts.distances[bad].tolist(), strict=True
+        ):
+            if self.robot[first] == self.robot[second]:
+                continue
+            other = second if self.robot[first] else first
+            body = int(self.model.geom_bodyid[other])
+            alike = self.model.geom_bodyid == body if body else np.arange(len(depths)) == other
+            depths[alike] = np.maximum(depths[alike], -distance)
+        return depths
+
     def touching(
         self, geoms: Bool[np.ndarray, "ngeom"], distance: float
     ) -> list[tuple[int, float]]:
@@ -153,5 +175,9 @@ class PlanningScene:
             pushed &= ~(load & (loose[first] ^ loose[second]))
             allowed[pushed] = np.minimum(allowed[pushed], -query.contact_allowance)
         allowed[by_gripper & (target[first] | target[second])] = clearance.target
+        if query.depths is not None:
+            depths = np.where(robot[first], query.depths[second], query.depths[first])
+            excused = one_robot & (depths > 0)
+            allowed[excused] = np.minimum(allowed[excused], -depths[excused])
         allowed[by_gripper & (attached[first] | attached[second])] = -np.inf
         return allowed

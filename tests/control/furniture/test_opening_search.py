@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
@@ -84,3 +87,26 @@ def test_a_drawer_that_is_open_shows_its_floor_and_sides():
     np.testing.assert_allclose(low[1:], [-0.18, 0.12], atol=0.008)
     assert high[1] == pytest.approx(0.18, abs=0.008)
     assert low[0] == pytest.approx(FRONT - opening, abs=0.01)
+
+
+def test_a_door_behind_the_arm_is_not_gone():
+    part = a_part("hinge").at(1.5)
+    part = replace(part, looks=np.random.default_rng(0).permutation(part.looks))
+    # The arm hides most of the door; where it would be less open, a shelf's edge is seen.
+    placed = transform(part.motion(1.5), part.looks)
+    decoy = transform(part.motion(1.15), part.looks)
+    edge = decoy[part.looks[:, 2] < np.percentile(part.looks[:, 2], 35)]
+    points = np.concatenate([placed[::80], edge])
+
+    def hidden(points: np.ndarray) -> np.ndarray:
+        return cKDTree(placed).query(points)[0] < 0.03
+
+    assert found_opening(part, points) < 1.3
+    assert found_opening(part, points, hidden) == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_push_that_moved_nothing_is_noticed():
+    part = a_part("hinge")
+    points = transform(part.motion(1.4), part.looks)
+    assert found_opening(part.at(0.0), points) == 0.0
+    assert found_opening(part.at(0.0), points, before=1.5) == pytest.approx(1.4, abs=0.05)

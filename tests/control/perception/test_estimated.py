@@ -166,6 +166,28 @@ def test_what_is_held_follows_the_hand(cup, truth):
     assert perception._held is None
 
 
+def test_what_fingers_are_around_does_not_jump_but_what_they_lose_may(cup, truth):
+    pose, extents = truth
+    estimator = Recalled(pose, extents)
+    perception = _perception(cup, estimator)
+    perception.reset(0)
+    joints, opening = cup.task.robot.configuration(cup.physics)
+    perception.hold("object")
+    moved = np.array(pose)
+    moved[:3, 3] += [0.06, 0.0, 0.0]
+    obj = cup.task.object
+    obj.place(cup.physics, moved @ invert(obj.asset.label.pose))
+    estimator.pose_world = moved
+    cup.step(np.append(joints, opening))
+    held = perception.observe().objects["object"].label_pose
+    np.testing.assert_allclose(held, pose, atol=2e-3)
+    for _ in range(40):
+        cup.step(np.append(joints, 0.0))
+    assert perception.robot()[1] < opening - 0.01
+    lost = perception.observe().objects["object"].label_pose
+    np.testing.assert_allclose(lost, moved, atol=1e-9)
+
+
 def test_low_confidence_brings_in_another_camera(cup, truth):
     sure, unsure = Recalled(*truth), Recalled(*truth, confidence=0.2)
     _perception(cup, sure).reset(0)
