@@ -86,7 +86,7 @@ def pick_object(
 ) -> ObjectPick:
     """The first grasp, in order of promise, that can be approached and can reach a destination.
 
-    Where there is none, the hand opens wider; and where the object is estimated, the fingers may at last touch what
+    Where there is none, the hand opens wider, and the arm bends otherwise; and where the object is estimated, the fingers may at last touch what
     it lies on: what is thin may leave them less room than its pose is uncertain by. Grasps like those that did not
     hold come last.
 
@@ -103,20 +103,18 @@ def pick_object(
     """
     grasps = object_grasps(obj)
     wider = replace(grasps, margin=WIDE_MARGIN)
-    attempts = [(planner, grasps), (planner, wider)]
+    attempts = [(planner, grasps, 1, 0), (planner, wider, 1, 0), (planner, grasps, 1, 1)]
     if len(slipped):
         others = grasps.take(np.flatnonzero(~_alike(obj, grasps, np.stack(slipped))))
-        attempts.insert(0, (planner, others))
+        attempts.insert(0, (planner, others, 1, 0))
     if obj.uncertainty > 0:
-        attempts.append((planner.touching_support(SOFT_TOUCH), grasps))
-    efforts = [1] * len(attempts)
+        attempts.append((planner.touching_support(SOFT_TOUCH), grasps, 1, 0))
     if thorough:
-        attempts.append((planner, grasps))
-        efforts.append(_THOROUGH)
+        attempts.append((planner, grasps, _THOROUGH, 0))
     failures = []
-    for (allowing, candidates), effort in zip(attempts, efforts, strict=True):
+    for allowing, candidates, effort, posture in attempts:
         try:
-            return _pick(allowing, estimate, obj, destinations, candidates, effort)
+            return _pick(allowing, estimate, obj, destinations, candidates, effort, posture)
         except StageFailure as failure:
             failures.append(failure)
     raise failures[0] from None
@@ -138,9 +136,11 @@ def _pick(
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     grasps: Grasps,
     effort: int,
+    posture: int,
 ) -> ObjectPick:
-    reaches = postures(grasps.tcp_poses, estimate.joints)
-    count = len(reaches[0].index)
+    """A pick among these grasps, to each of which the arm comes by the `posture`-th nearest solution first."""
+    reaches = postures(grasps.tcp_poses, estimate.joints)[posture:]
+    count = len(reaches[0].index) if reaches else 0
     if not count:
         raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")
     free = _free_of_collision(planner, grasps, reaches, obj.geoms)
