@@ -115,15 +115,14 @@ def _how_to_get(
     by_set: dict[str, list[str]] = {}
     for name in missing:
         by_set.setdefault(protocol.sources[name], []).append(name)
-    lists = "; ".join(f"{data_set}: {' '.join(names)}" for data_set, names in by_set.items())
     where = f"--assets {' '.join(folders)}" if folders else "--assets, which is not given,"
     commands = " and ".join(
-        f"`manipose assets build {data_set} PATH --only {' '.join(names[:2])}{' ...' * (len(names) > 2)} --out DIR`"
+        f"`manipose assets build {data_set} PATH --out DIR --only {' '.join(names)}`"
         for data_set, names in by_set.items()
     )
     return (
-        f"protocol {protocol.version}: {where} lacks {len(missing)} of {count} objects ({lists}); `manipose assets "
-        f"fetch SOURCE` gets a data set or says where it is to be had, then {commands}"
+        f"protocol {protocol.version}: {where} lacks {len(missing)} of {count} objects; `manipose assets fetch SOURCE` "
+        f"gets a data set or says where it is to be had, then {commands}"
     )
 
 

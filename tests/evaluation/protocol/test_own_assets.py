@@ -80,7 +80,7 @@ def test_what_is_missing_is_named_in_one_line_with_the_way_to_it(listed, tmp_pat
         InputError, match=r"lacks 1 of 2 objects \(partnet_mobility: 101\)"
     ) as caught:
         own_assets.find_assets("v1-real", (TASK, DRAWN), [tmp_path / "scans"])
-    assert "manipose assets build partnet_mobility PATH --only 101 --out DIR" in str(caught.value)
+    assert "manipose assets build partnet_mobility PATH --out DIR --only 101`" in str(caught.value)
     assert "\n" not in str(caught.value)
     # Who only plays what has all its objects needs no others.
     found = own_assets.find_assets("v1-real", (TASK,), [tmp_path / "scans"])
