@@ -135,7 +135,8 @@ def _reached(tcp_poses: Float[np.ndarray, "n 4 4"]) -> Bool[np.ndarray, "n 1"]:
     ways = np.stack([tcp_poses, tcp_poses @ _HALF_TURN], axis=1)
     back = ways.copy()
     back[..., :3, 3] -= _STANDOFF * back[..., :3, 2]
-    return (is_reachable(ways) & is_reachable(back)).any(axis=1)[:, None]
+    found = is_reachable(ways) & is_reachable(back)
+    return np.any(found, axis=1, keepdims=True)
 
 
 def _between_front_and_body(
