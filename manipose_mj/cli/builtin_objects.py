@@ -46,4 +46,4 @@ def names_in_protocol(version: str, tasks: Sequence[str], episodes: int) -> list
 
     frozen = protocol.load(version)
     used = (frozen.episode(task, i).objects for task in tasks for i in range(episodes))
-    return sorted({name for each in used for name in each})
+    return sorted({name for each in used for name in each} - set(frozen.sources))

@@ -38,9 +38,9 @@ def demo(
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.protocol import VERSIONS
 
-    config = EvaluationConfig(TASKS, out, episodes=EPISODES, jobs=jobs, protocol=VERSIONS[-1])
+    config = EvaluationConfig(TASKS, out, episodes=EPISODES, jobs=jobs, protocol=VERSIONS[0])
     _claim(out)
-    load_objects(names_in_protocol(VERSIONS[-1], TASKS, EPISODES), jobs)
+    load_objects(names_in_protocol(VERSIONS[0], TASKS, EPISODES), jobs)
     return run_and_report(config, resume=False)
 
 

@@ -28,7 +28,8 @@ def evaluate(
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
-    protocol: Annotated[str | None, arg(metavar="v1", help_behavior_hint="")] = None,
+    protocol: Annotated[str | None, arg(metavar="v1|v1-real", help_behavior_hint="")] = None,
+    assets: Annotated[tuple[str, ...], arg(metavar="DIR...", help_behavior_hint="")] = (),
     resample: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,
     dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None,
     policy: Annotated[
@@ -62,7 +63,7 @@ def evaluate(
 
     Args:
       tasks: Tasks to run, as `manipose list` names them.
-      episodes: Episodes per task; by default 50, or all 100 of a protocol.
+      episodes: Episodes per task; by default 50, or all of a protocol.
       seed: Base seed; each episode derives its own from it.
       pose: Where the baseline takes its knowledge from: the simulator, or clouds; or clouds of objects only,
         furniture and surroundings from the simulator.
@@ -71,7 +72,9 @@ def evaluate(
       resume: Go on with the results in --out after an interruption.
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
-      protocol: Frozen protocol to follow: its evaluation seeds, and its test objects.
+      protocol: Frozen protocol to follow: its evaluation seeds, and its test objects; those of v1-real are scans
+        that you build.
+      assets: Folders with what `manipose assets build` made of the data sets of v1-real.
       resample: Play a protocol's episodes with other seeds, drawn from this one; their objects of question stay.
       dask: Run on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786, instead of --jobs; its
         workers have to see --out and the folders of --objects.
@@ -115,7 +118,7 @@ def evaluate(
             raise InputError("--resume needs --out: the folder whose evaluation goes on")
         out = Path("manipose_results") / time.strftime("%Y%m%d-%H%M%S")
     if episodes is None:
-        episodes = EPISODES if protocol else 50
+        episodes = EPISODES.get(protocol, 50) if protocol else 50
     options = {
         "arguments": policy_args,
         "obs_mode": obs_mode,
@@ -152,6 +155,7 @@ def evaluate(
         batch=batch,
         errors=errors,
         grasps=grasps,
+        assets=assets,
     )
     named = check_names(tasks, objects)
     if config.estimator is not None:

@@ -1,4 +1,4 @@
-"""`manipose protocol`: certificates that a protocol's starts can be solved."""
+"""`manipose protocol`: certificates that a protocol's starts can be solved, and the assets that one asks for."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ def build_app() -> SubcommandApp:
     app = SubcommandApp()
     app.command(name="verify")(verify_protocol)
     app.command(name="certify")(certify_protocol)
+    app.command(name="assets")(protocol_assets)
     return app
 
 
@@ -30,6 +31,7 @@ def verify_protocol(
     episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
     jobs: int = CORES,
     certificates: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
+    assets: Annotated[tuple[str, ...], arg(metavar="DIR...", help_behavior_hint="")] = (),
 ) -> int:
     """Replay the certificates of a protocol's starts: the baseline must solve each again.
 
@@ -39,20 +41,23 @@ def verify_protocol(
       episodes: Only the first so many of each task; by default all.
       jobs: Episodes at the same time, one core each.
       certificates: File of certificates; by default the package's own.
+      assets: Folders of assets built from the data sets of v1-real.
     """
     one_thread_per_process()
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import load_certificates
     from manipose_mj.evaluation.certification.search import chosen_starts, verify
     from manipose_mj.evaluation.protocol.frozen import load
+    from manipose_mj.evaluation.protocol.own_assets import find_assets
 
     protocol = load(version)
     known = load_certificates(protocol, certificates)
     starts = chosen_starts(protocol, tasks, episodes)
+    find_assets(version, {task for task, _ in starts}, assets)
     certified = [start for start in starts if start in known.solved]
     broken = []
     with output.Progress("certificates") as progress:
-        for done, (start, outcome) in enumerate(verify(version, known, certified, jobs), 1):
+        for done, (start, outcome) in enumerate(verify(version, known, certified, jobs, assets), 1):
             if isinstance(outcome, str):
                 broken.append((start, outcome))
             progress.update(done, len(certified), f"{done - len(broken)} hold")
@@ -77,6 +82,7 @@ def certify_protocol(
     episodes: Annotated[int | None, arg(metavar="INT", help_behavior_hint="")] = None,
     again: Annotated[bool, arg(help_behavior_hint="")] = False,
     jobs: int = CORES,
+    assets: Annotated[tuple[str, ...], arg(metavar="DIR...", help_behavior_hint="")] = (),
 ) -> int:
     """Find the certificates that are missing: a planner's seed and a number of plans that solve a start.
 
@@ -89,6 +95,7 @@ def certify_protocol(
       episodes: Only the first so many of each task; by default all.
       again: Try starts that were not solved once more.
       jobs: Episodes at the same time, one core each.
+      assets: Folders of assets built from the data sets of v1-real.
     """
     one_thread_per_process()
     from manipose_mj.console import output
@@ -98,15 +105,17 @@ def certify_protocol(
     )
     from manipose_mj.evaluation.certification.search import certify, chosen_starts
     from manipose_mj.evaluation.protocol.frozen import load
+    from manipose_mj.evaluation.protocol.own_assets import find_assets
 
     if not out.parent.is_dir():
         raise InputError(f"{out.parent}: no such folder")
     protocol = load(version)
     known = load_certificates(protocol, out)
+    find_assets(version, tasks or protocol.tasks, assets)
     settled = set(known.solved) if again else {*known.solved, *known.unsolved}
     missing = [each for each in chosen_starts(protocol, tasks, episodes) if each not in settled]
     with output.Progress("starts") as progress:
-        for done, (start, outcome) in enumerate(certify(version, missing, jobs), 1):
+        for done, (start, outcome) in enumerate(certify(version, missing, jobs, assets), 1):
             known = known.with_outcome(start, outcome)
             save_certificates(known, out)
             progress.update(done, len(missing), f"{len(known.solved)} certified")
@@ -115,3 +124,38 @@ def certify_protocol(
         console.print(f"{task} {number}: {reason}", soft_wrap=True)
     console.print(f"{out}: {len(known.solved)} certified, {len(known.unsolved)} unsolved")
     return 0
+
+
+def protocol_assets(
+    version: Annotated[Positional[str], arg(metavar="VERSION", help_behavior_hint="")] = "v1-real",
+    /,
+    *,
+    tasks: Annotated[tuple[str, ...], arg(metavar="TASK...", help_behavior_hint="")] = (),
+    assets: Annotated[tuple[str, ...], arg(metavar="DIR...", help_behavior_hint="")] = (),
+) -> int:
+    """List the objects of data sets that a protocol leaves to you to build; exits with 1 if folders lack some.
+
+    Args:
+      version: Of the protocol.
+      tasks: For these only; by default for all.
+      assets: Folders of built assets to look into.
+    """
+    from manipose_mj.console import output
+    from manipose_mj.evaluation.protocol.frozen import load
+    from manipose_mj.evaluation.protocol.own_assets import built_assets, needed
+
+    protocol = load(version)
+    names = needed(protocol, tasks or protocol.tasks)
+    present = {(asset.data_set, asset.name) for asset in built_assets(assets)}
+    console, lacking = output.standard_output(), 0
+    for data_set in dict.fromkeys(protocol.sources[name] for name in names):
+        own = [name for name in names if protocol.sources[name] == data_set]
+        missing = [name for name in own if (data_set, name) not in present]
+        lacking += len(missing)
+        console.print(f"{data_set}, {len(own)} objects: {' '.join(own)}", soft_wrap=True)
+        if assets:
+            said = f"lacks {' '.join(missing)}" if missing else "has them all"
+            console.print(f"  {' '.join(assets)} {said}", soft_wrap=True)
+    if not names:
+        console.print(f"protocol {version}: all objects are built in")
+    return _EXIT_FAILED if assets and lacking else 0

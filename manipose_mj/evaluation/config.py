@@ -22,6 +22,7 @@ from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.protocol.own_assets import digest_of, find_assets, pool_folders
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -56,10 +57,11 @@ class EvaluationConfig:
       jobs: Episodes that run at the same time, each on one core. Results do not depend on it.
       objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
         folders of them.
-      protocol: Version of the protocol whose seeds and test objects to take instead of `seed` and the
-        training objects.
+      protocol: Version of the protocol whose seeds and objects to take instead of `seed` and the training
+        objects.
+      assets: Folders with the assets that this version leaves to the user to build; else none.
       dask: Address of a dask scheduler whose workers run the episodes instead of `jobs` processes of this
-        machine; they have to see `out` and the folders of `objects`. Results do not depend on it.
+        machine; they have to see `out` and the folders of `objects` and `assets`. Results do not depend on it.
       policy: Whose episodes they are; None: the baseline's.
       resample: Base seed for other seeds of the protocol's episodes, whose objects, furniture and parts stay.
       planner: Makes the baseline's plans.
@@ -85,6 +87,7 @@ class EvaluationConfig:
     batch: BatchSettings | None = None
     errors: InjectedErrors = InjectedErrors()
     grasps: GraspSource | None = None
+    assets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.tasks:
@@ -113,6 +116,8 @@ class EvaluationConfig:
         self._check_grasps()
         if self.protocol is not None:
             self._check_protocol(protocol.load(self.protocol))
+        elif self.assets:
+            raise InputError("--assets is of a protocol's objects; name others by --objects")
 
     def _check_errors(self) -> None:
         """Refuse errors that nobody would notice."""
@@ -157,6 +162,28 @@ class EvaluationConfig:
             )
         for task in self.tasks:
             frozen.episode(task, self.episodes - 1)
+        if self.assets and not frozen.sources:
+            raise InputError(
+                f"protocol {self.protocol} has built-in objects only; leave out --assets"
+            )
+
+    def check_assets(self) -> None:
+        """Raise `InputError`, one line that names them, where the user has not built all that the protocol asks for."""
+        if self.protocol is not None:
+            find_assets(self.protocol, self.tasks, self.assets)
+
+    def objects_of(self, task: str) -> tuple[str, ...] | None:
+        """What the episodes of a task use instead of built-in objects, as `objects`."""
+        if self.protocol is None:
+            return self.objects
+        return pool_folders(self.protocol, task, self.assets)
+
+    @property
+    def assets_digest(self) -> str | None:
+        """Which builds of the user's assets a protocol's episodes use; None where all are built in."""
+        if self.protocol is None or not self.assets:
+            return None
+        return digest_of(find_assets(self.protocol, self.tasks, self.assets).values())
 
     @property
     def poses(self) -> dict[str, str]:
@@ -197,7 +224,7 @@ class EvaluationConfig:
                 task,
                 obs_mode=self.policy.obs_mode,
                 control_mode=self.policy.control_mode,
-                objects=self.objects,
+                objects=self.objects_of(task),
                 split=self.split,
                 sensors=self.errors.of_sensors(feature_sensors(self.policy.obs_mode)),
                 latency=self.errors.latency,
@@ -205,7 +232,7 @@ class EvaluationConfig:
         return EnvConfig(
             task,
             obs_mode="state",
-            objects=self.objects,
+            objects=self.objects_of(task),
             split=self.split,
             sensors=self.errors.of_sensors(sensors_for(self.pose)),
             latency=self.errors.latency,
@@ -240,6 +267,7 @@ class EvaluationConfig:
             "objects": None if self.objects is None else list(self.objects),
             "protocol": self.protocol,
             "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,
+            "assets sha256": self.assets_digest,
             "resample": self.resample,
             "policy": self.policy and self.policy.identity,
             "planner": self.planner.identity,
@@ -255,6 +283,7 @@ class EvaluationConfig:
         """The command line that repeats this evaluation."""
         words = ["manipose", "evaluate", *self.tasks]
         chosen = ["--protocol", self.protocol] if self.protocol else ["--seed", str(self.seed)]
+        chosen += ["--assets", *self.assets] if self.assets else []
         if self.resample is not None:
             chosen += ["--resample", str(self.resample)]
         whose = ["--pose", self.pose, *self.planner.words]

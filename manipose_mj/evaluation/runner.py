@@ -140,9 +140,10 @@ def evaluate(
 
     Raises:
       InputError: The folder cannot be written or holds results of something else, an episode's
-        input is wrong, or there is no such cluster.
+        input is wrong, the protocol's assets are not all there, or there is no such cluster.
       WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
+    config.check_assets()
     metadata = _checked_policy(config)
     _check_estimator(config)
     if runner is None and config.policy is not None:
@@ -324,7 +325,8 @@ def _independent_of_folder(config: EvaluationConfig) -> EvaluationConfig:
     objects = config.objects and tuple(
         str(Path(each).absolute()) if is_folder(each) else each for each in config.objects
     )
-    return replace(config, out=config.out.absolute(), objects=objects)
+    assets = tuple(str(Path(each).absolute()) for each in config.assets)
+    return replace(config, out=config.out.absolute(), objects=objects, assets=assets)
 
 
 def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -> EpisodeResult:
@@ -382,6 +384,7 @@ def _crashed(
 def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str, Any]:
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
+    settings["assets"] = list(config.assets)
     settings["pose"] = config.pose_source
     settings["poses"] = config.poses
     settings["grasps"] = config.grasp_source

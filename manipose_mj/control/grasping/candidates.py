@@ -68,8 +68,21 @@ def reachable(
 
     Solutions next to a singularity do not count: the arm could not leave them in a straight line.
     """
+    return postures(tcp_poses, near, extra_seeds=extra_seeds)[0]
+
+
+def postures(
+    tcp_poses: Float[np.ndarray, "n 4 4"],
+    near: Float[np.ndarray, "7"],
+    *,
+    extra_seeds: Float[np.ndarray, "n 7"] | None = None,
+) -> tuple[Reach, ...]:
+    """`reachable`, then for the poses that have them the second nearest solutions, and so on.
+
+    The arm has a joint more than a pose needs: where its elbow or forearm meets something, it may bend otherwise.
+    """
     if not len(tcp_poses):
-        return Reach(np.empty(0, int), np.empty((0, 7)))
+        return (Reach(np.empty(0, int), np.empty((0, 7))),)
     seeds = seeds_for(tcp_poses)
     if extra_seeds is not None:
         seeds = np.concatenate([seeds, extra_seeds[None]])
@@ -78,6 +91,8 @@ def reachable(
     least = np.linalg.eigvalsh(jacobian @ jacobian.transpose(0, 2, 1))[:, 0]
     solved[solved] = least > MIN_DEXTERITY**2
     distance = np.where(solved, np.abs(joints - near).sum(axis=-1), np.inf)
-    best = distance.argmin(axis=0)
-    index = np.flatnonzero(np.isfinite(distance.min(axis=0)))
-    return Reach(index, joints[best[index], index])
+    found = []
+    for rank in np.argsort(distance, axis=0, kind="stable"):
+        index = np.flatnonzero(np.isfinite(np.take_along_axis(distance, rank[None], axis=0)[0]))
+        found.append(Reach(index, joints[rank[index], index]))
+    return tuple(found)

@@ -13,7 +13,7 @@ from manipose_mj.control.grasping.candidates import (
     Grasps,
     Reach,
     object_grasps,
-    reachable,
+    postures,
 )
 from manipose_mj.control.grasping.part_pick import grip_handle
 from manipose_mj.control.grasping.retraction import (
@@ -38,6 +38,8 @@ _LEVER = 0.08
 _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
+_POSTURES = 3  # of the arm at a destination
+_FEW = 12  # free grasps, below which the arm is bent otherwise
 _THOROUGH = 4  # times as many, where nothing else works
 # Grasps nearer than this to one another hold alike [m, rad].
 _ALIKE = (0.02, 0.5)
@@ -84,7 +86,7 @@ def pick_object(
 ) -> ObjectPick:
     """The first grasp, in order of promise, that can be approached and can reach a destination.
 
-    Where there is none, the hand opens wider; and where the object is estimated, the fingers may at last touch what
+    Where there is none, the hand opens wider, and the arm bends otherwise; and where the object is estimated, the fingers may at last touch what
     it lies on: what is thin may leave them less room than its pose is uncertain by. Grasps like those that did not
     hold come last.
 
@@ -101,20 +103,18 @@ def pick_object(
     """
     grasps = object_grasps(obj)
     wider = replace(grasps, margin=WIDE_MARGIN)
-    attempts = [(planner, grasps), (planner, wider)]
+    attempts = [(planner, grasps, 1, 0), (planner, wider, 1, 0), (planner, grasps, 1, 1)]
     if len(slipped):
         others = grasps.take(np.flatnonzero(~_alike(obj, grasps, np.stack(slipped))))
-        attempts.insert(0, (planner, others))
+        attempts.insert(0, (planner, others, 1, 0))
     if obj.uncertainty > 0:
-        attempts.append((planner.touching_support(SOFT_TOUCH), grasps))
-    efforts = [1] * len(attempts)
+        attempts.append((planner.touching_support(SOFT_TOUCH), grasps, 1, 0))
     if thorough:
-        attempts.append((planner, grasps))
-        efforts.append(_THOROUGH)
+        attempts.append((planner, grasps, _THOROUGH, 0))
     failures = []
-    for (allowing, candidates), effort in zip(attempts, efforts, strict=True):
+    for allowing, candidates, effort, posture in attempts:
         try:
-            return _pick(allowing, estimate, obj, destinations, candidates, effort)
+            return _pick(allowing, estimate, obj, destinations, candidates, effort, posture)
         except StageFailure as failure:
             failures.append(failure)
     raise failures[0] from None
@@ -136,13 +136,16 @@ def _pick(
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     grasps: Grasps,
     effort: int,
+    posture: int,
 ) -> ObjectPick:
-    reach = reachable(grasps.tcp_poses, estimate.joints)
-    if not len(reach.index):
+    """A pick among these grasps, to each of which the arm comes by the `posture`-th nearest solution first."""
+    reaches = postures(grasps.tcp_poses, estimate.joints)[posture:]
+    count = len(reaches[0].index) if reaches else 0
+    if not count:
         raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")
-    free = _free_of_collision(planner, grasps, reach, obj.geoms)
+    free = _free_of_collision(planner, grasps, reaches, obj.geoms)
     if not len(free.index):
-        raise StageFailure("plan", f"all {len(reach.index)} reachable grasps of {obj.name} collide")
+        raise StageFailure("plan", f"all {count} reachable grasps of {obj.name} collide")
     approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
     way = way_out(estimate, destinations[0][:3, 3]) if destinations else None
     tries = 0
@@ -187,14 +190,19 @@ def pick_part(
 
 
 def _free_of_collision(
-    planner: MotionPlanner, grasps: Grasps, reach: Reach, target: np.ndarray
+    planner: MotionPlanner, grasps: Grasps, reaches: Sequence[Reach], target: np.ndarray
 ) -> Reach:
-    kept = []
-    for k, index in enumerate(reach.index):
-        query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
-        if not planner.collides(reach.joints[k], query):
-            kept.append(k)
-    return Reach(reach.index[kept], reach.joints[kept])
+    """The grasps that are free as the arm comes to them first; where those are few, also as it comes otherwise."""
+    kept: dict[int, Float[np.ndarray, "7"]] = {}
+    for reach in reaches:
+        if len(kept) >= _FEW:
+            break
+        for index, joints in zip(reach.index.tolist(), reach.joints, strict=True):
+            query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
+            if index not in kept and not planner.collides(joints, query):
+                kept[index] = joints
+    index = np.array(sorted(kept), int)
+    return Reach(index, np.array([kept[i] for i in index.tolist()]).reshape(-1, 7))
 
 
 def _with_destination(
@@ -222,20 +230,20 @@ def _with_destination(
     likely = np.argsort(promise, kind="stable")[:_MAX_PAIRS]
     owner, tcp_goals, promise = owner[likely], tcp_goals[likely], promise[likely]
     starts = free.joints[owner]
-    reach = reachable(tcp_goals, free.joints.mean(axis=0), extra_seeds=starts)
-    travel = np.abs(reach.joints - starts[reach.index]).max(axis=1)
-    # A short way with a middling grasp beats a long one with the best.
-    order = np.argsort(travel + promise[reach.index], kind="stable")
     used: dict[int, int] = {}
-    for k in order:
-        grasp = int(owner[reach.index[k]])
-        if used.get(grasp, 0) == 2:
-            continue
-        index = int(free.index[grasp])
-        if planner.collides(reach.joints[k], _attached(grasps, index, obj).query(CONTACT)):
-            continue
-        used[grasp] = used.get(grasp, 0) + 1
-        yield index, free.joints[grasp], reach.joints[k]
+    for reach in postures(tcp_goals, free.joints.mean(axis=0), extra_seeds=starts)[:_POSTURES]:
+        travel = np.abs(reach.joints - starts[reach.index]).max(axis=1)
+        # A short way with a middling grasp beats a long one with the best.
+        order = np.argsort(travel + promise[reach.index], kind="stable")
+        for k in order:
+            grasp = int(owner[reach.index[k]])
+            if used.get(grasp, 0) == 2:
+                continue
+            index = int(free.index[grasp])
+            if planner.collides(reach.joints[k], _attached(grasps, index, obj).query(CONTACT)):
+                continue
+            used[grasp] = used.get(grasp, 0) + 1
+            yield index, free.joints[grasp], reach.joints[k]
 
 
 def _promise(

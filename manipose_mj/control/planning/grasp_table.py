@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.control.grasping.candidates import MIN_CLEARANCE, object_grasps, reachable
+from manipose_mj.control.grasping.candidates import MIN_CLEARANCE, object_grasps, postures
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.table_places import rest_of
 from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
@@ -19,6 +19,8 @@ _OPEN = replace(CONTACT, arm=0.002, target=0.0)
 _FROM_BELOW = 0.35  # the upward part of an approach from which on nothing is tried
 _TURNS = 8  # of an axis of symmetry
 _BLOCK = 96  # poses whose inverse kinematics are solved at once
+_POSTURES = 3  # of the arm at a grasp, where few are free
+_FEW = 12  # grasps
 ENOUGH = 8  # grasps found from which on the rest need not be looked at
 
 
@@ -80,15 +82,18 @@ class GraspTable:
         objects = poses @ invert(self._object.label.pose)
         for first in range(0, len(likely), _BLOCK):
             block = likely[first : first + _BLOCK]
-            reach = reachable(tcp_poses[block], self._estimate.joints)
-            for k, joints in zip(block[reach.index], reach.joints, strict=True):
-                grasp = int(owner[k])
-                if found[grasp]:
-                    continue
-                moved = self._planner.within(scene.with_body_at(body, objects[turn[k]]))
-                opening = float(self._openings[grasp])
-                query = CollisionQuery(_OPEN, opening=opening, target=self._object.geoms)
-                found[grasp] = not moved.collides(joints, query)
+            reaches = postures(tcp_poses[block], self._estimate.joints)[:_POSTURES]
+            for rank, reach in enumerate(reaches):
+                if rank and found.sum() >= min(enough, _FEW):
+                    break
+                for k, joints in zip(block[reach.index], reach.joints, strict=True):
+                    grasp = int(owner[k])
+                    if found[grasp]:
+                        continue
+                    moved = self._planner.within(scene.with_body_at(body, objects[turn[k]]))
+                    opening = float(self._openings[grasp])
+                    query = CollisionQuery(_OPEN, opening=opening, target=self._object.geoms)
+                    found[grasp] = not moved.collides(joints, query)
             if found.sum() >= enough:
                 break
         return found

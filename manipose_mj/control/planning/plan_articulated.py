@@ -42,6 +42,7 @@ _DRAWER_FRONT = (0.35, 0.5, 0.2, 0.7, 0.95, 0.0, -0.3, -0.6)
 _DOOR_FRONT = (0.95, 0.75, 0.5, 0.25)
 _SIDEWAYS = (0.0, 0.3, -0.3, 0.6, -0.6, 0.95, -0.95)
 _MAX_PER_WAY = 3  # places in the cavity for each way to lie
+_AT_LEAST_DRAWN = 0.01  # a drawer that somebody reaches into [m]
 _ENOUGH_HANDS = 8  # grasps with room for the hand, from which on more make no place better
 _STICKS_OUT = 0.003  # of a cavity, by which an object may [m]
 _APART = 0.008  # between objects that lie side by side [m]
@@ -259,6 +260,9 @@ def poses_in_cavity(
     taken = [] if estimate is None else _boxes_inside(estimate, obj, part)
     open_side = _UP if cavity.moves_with_part else front
     down = obj.label_pose[2, :3]
+    drawn = None
+    if cavity.moves_with_part and part.joint.kind == "slide":
+        drawn = front[:2] * max(opening - part.joint.range[0], _AT_LEAST_DRAWN)
     found = []
     for rotation in _ways_to_turn(obj):
         reach = obj.label.reach(rotation)
@@ -279,7 +283,8 @@ def poses_in_cavity(
                 if _meets(place_, reach, taken):
                     continue
                 # Without grasps that are known to come from there, any place is as good.
-                room = count_clear(hands, floor + place_ + to_object, cavity, open_side, taken)
+                at = floor + place_ + to_object
+                room = count_clear(hands, at, cavity, open_side, taken, drawn)
                 places.append((-min(room, _ENOUGH_HANDS), abs(sideways), -share, place_))
         # Stable: of places with as much room those come first that come first above.
         places.sort(key=lambda entry: entry[0])

@@ -12,6 +12,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation.certification.certificates import Certificate, Certificates, Key
 from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
+from manipose_mj.evaluation.protocol.own_assets import pool_folders
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
 ATTEMPTS = 2
@@ -41,17 +42,29 @@ def chosen_starts(
 
 
 def certify(
-    version: str, starts: Sequence[Key], jobs: int
+    version: str, starts: Sequence[Key], jobs: int, assets: tuple[str, ...] = ()
 ) -> Iterator[tuple[Key, Certificate | str]]:
-    """Look for certificates; each as it is found, or the reason why the last attempt failed."""
-    yield from _in_parallel(((version, start, None) for start in starts), jobs)
+    """Look for certificates; each as it is found, or the reason why the last attempt failed.
+
+    Args:
+      version: Of the protocol.
+      starts: Of it.
+      jobs: Episodes at the same time.
+      assets: Folders with those that this version leaves to the user to build.
+    """
+    yield from _in_parallel(((version, start, None, assets) for start in starts), jobs)
 
 
 def verify(
-    version: str, known: Certificates, starts: Sequence[Key], jobs: int
+    version: str,
+    known: Certificates,
+    starts: Sequence[Key],
+    jobs: int,
+    assets: tuple[str, ...] = (),
 ) -> Iterator[tuple[Key, Certificate | str]]:
     """Replay certificates; each that still solves its start, or the reason why it does not."""
-    yield from _in_parallel(((version, start, known.solved[start]) for start in starts), jobs)
+    solved = known.solved
+    yield from _in_parallel(((version, start, solved[start], assets) for start in starts), jobs)
 
 
 def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate | str]]:
@@ -61,14 +74,15 @@ def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate
 
 
 def _outcome(
-    version: str, start: Key, certificate: Certificate | None
+    version: str, start: Key, certificate: Certificate | None, assets: tuple[str, ...] = ()
 ) -> tuple[Key, Certificate | str]:
     """Play a start by a certificate; without one, look for one."""
     # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
     logging.getLogger("absl").setLevel(logging.ERROR)
     task, number = start
     frozen = load(version).episode(task, number)
-    config = EnvConfig(task, obs_mode="state", split="test")
+    objects = pool_folders(version, task, assets)
+    config = EnvConfig(task, obs_mode="state", split="test", objects=objects)
     reason = ""
     for attempt in attempts(frozen.seed) if certificate is None else (certificate,):
         result, _ = run_episode(

@@ -1,5 +1,7 @@
 """Writes a protocol's file from the tasks as they are: `python -m manipose_mj.evaluation.protocol.freeze v1`.
 
+For `v1-real`, folders of built assets follow: all that they hold of the three data sets enters.
+
 Only before a version is released: afterwards a change of any task is a new version.
 """
 
@@ -9,11 +11,14 @@ import hashlib
 import json
 import re
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.protocol.frozen import (
     EPISODES,
@@ -22,10 +27,22 @@ from manipose_mj.evaluation.protocol.frozen import (
     evaluation_seed,
     protocol_path,
 )
+from manipose_mj.evaluation.protocol.own_assets import BuiltAsset, built_assets
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+from manipose_mj.tasks.clutter.object_draw import require_fit_for_piles
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import TaskSpec, all_tasks, task_spec
 from manipose_mj.tasks.core.scene_source import SceneSource
+from manipose_mj.tasks.scene.resting import require_graspable
+
+# Categories of the data sets' furniture for the tasks with a word in their name, the first that fits.
+_FURNITURE = {
+    "microwave": ("microwave",),
+    "oven": ("oven", "dishwasher"),
+    "": ("cabinet", "table", "refrigerator"),
+}
+# With a user's objects it stores any of them, as `store_middle_drawer` does.
+_SAME_WITH_SCANS = ("articulated/store_chips_can_middle_drawer",)
 
 
 def builtin_tasks() -> list[TaskSpec]:
@@ -34,9 +51,9 @@ def builtin_tasks() -> list[TaskSpec]:
     return [spec for spec in specs if spec.factory.__module__.startswith("manipose_mj.tasks.")]
 
 
-def frozen_settings(spec: TaskSpec) -> dict[str, Any]:
+def frozen_settings(spec: TaskSpec, config: EnvConfig | None = None) -> dict[str, Any]:
     """What the protocol's file says of a task's configuration, from the task itself."""
-    scenes = SceneSource(spec, evaluation_config(spec))
+    scenes = SceneSource(spec, config or evaluation_config(spec))
     task = scenes.build(scenes.draw(np.random.RandomState(0), EpisodeSpec()))
     return {
         "horizon": task.config.horizon,
@@ -45,12 +62,16 @@ def frozen_settings(spec: TaskSpec) -> dict[str, Any]:
     }
 
 
-def frozen_episodes(version: str, spec: TaskSpec) -> list[dict[str, Any]]:
+def frozen_episodes(
+    version: str, spec: TaskSpec, config: EnvConfig | None = None
+) -> list[dict[str, Any]]:
     """The entries of a task's episodes: every group of its objects comes equally often."""
-    scenes = SceneSource(spec, evaluation_config(spec))
+    scenes = SceneSource(spec, config or evaluation_config(spec))
     groups = scenes.strata()
+    if not groups:
+        raise InputError("no object is of use")
     entries = []
-    for i in range(EPISODES):
+    for i in range(EPISODES[version]):
         group = groups[i % len(groups)]
         asked = group[i // len(groups) % len(group)]
         seed = evaluation_seed(version, spec.full_name, i)
@@ -66,9 +87,9 @@ def frozen_entry(scenes: SceneSource, asked: EpisodeSpec) -> dict[str, Any]:
     return {**entry, "objects": list(dict.fromkeys(names))}
 
 
-def evaluation_config(spec: TaskSpec) -> EnvConfig:
+def evaluation_config(spec: TaskSpec, objects: Sequence[Asset] | None = None) -> EnvConfig:
     """The environment that evaluations take place in."""
-    return EnvConfig(spec.full_name, obs_mode="state", split="test")
+    return EnvConfig(spec.full_name, obs_mode="state", split="test", objects=objects)
 
 
 def document(version: str) -> dict[str, Any]:
@@ -77,16 +98,86 @@ def document(version: str) -> dict[str, Any]:
         spec.full_name: {**frozen_settings(spec), "episodes": frozen_episodes(version, spec)}
         for spec in builtin_tasks()
     }
-    content: dict[str, Any] = {"version": version, "tasks": dict(sorted(tasks.items()))}
-    return {"version": version, "sha256": digest(content), "tasks": content["tasks"]}
+    return _stated({"version": version, "tasks": dict(sorted(tasks.items()))})
+
+
+def document_of_assets(version: str, assets: Sequence[BuiltAsset]) -> dict[str, Any]:
+    """The content of the file of a version whose assets users build; tasks that can use none of them are left out.
+
+    Raises:
+      InputError: Two assets have the same name.
+    """
+    own = sorted((asset for asset in assets if asset.data_set), key=lambda a: (a.data_set, a.name))
+    names = [asset.name for asset in own]
+    if len(set(names)) < len(names):
+        raise InputError(f"several assets are called {max(names, key=names.count)}")
+    loaded = [read_asset(asset.folder) for asset in own]
+    tasks, used = {}, set()
+    for spec in sorted(builtin_tasks(), key=lambda spec: spec.full_name):
+        pool = pool_for(spec, loaded)
+        config = evaluation_config(spec, pool)
+        try:
+            if not pool or spec.full_name in _SAME_WITH_SCANS:
+                raise InputError(
+                    f"{spec.full_name}: it is another task's twin, or there is nothing for it"
+                )
+            episodes = frozen_episodes(version, spec, config)
+            settings = frozen_settings(spec, config)
+        except InputError as error:
+            sys.stderr.write(f"left out: {spec.full_name}: {error}\n")
+            continue
+        named = {entry.get("furniture") for entry in episodes}
+        # Pieces without the part in question are of no use to anybody.
+        pooled = [each.name for each in pool if each.kind == "rigid" or each.name in named]
+        used |= set(pooled)
+        tasks[spec.full_name] = {**settings, "pool": pooled, "episodes": episodes}
+    lists: dict[str, list[str]] = {}
+    for asset in own:
+        if asset.name in used:
+            lists.setdefault(asset.data_set, []).append(asset.name)
+    return _stated({"version": version, "assets": lists, "tasks": tasks})
+
+
+def pool_for(spec: TaskSpec, assets: Sequence[Asset]) -> list[Asset]:
+    """Of the assets those that a task may draw: what a hand can hold, and furniture of the kind that it is about."""
+    require = require_fit_for_piles if spec.domain == "clutter" else require_graspable
+    rigid = [each for each in assets if each.graspable is not False and _meets(require, each)]
+    if "articulated" not in spec.tags:
+        return rigid
+    kinds = next(kinds for word, kinds in _FURNITURE.items() if word in spec.full_name)
+    pieces = [
+        each
+        for each in assets
+        if each.kind == "articulated"
+        and each.category in kinds
+        and any(part.handle is not None for part in each.parts)
+    ]
+    if {"store", "take_out"} & set(spec.tags):
+        return pieces and [*pieces, *rigid]
+    return pieces
+
+
+def _meets(require: Callable[[Asset], None], asset: Asset) -> bool:
+    if asset.kind != "rigid":
+        return False
+    try:
+        require(asset)
+    except InputError:
+        return False
+    return True
+
+
+def _stated(content: dict[str, Any]) -> dict[str, Any]:
+    tasks = content.pop("tasks")
+    return {**content, "sha256": digest({**content, "tasks": tasks}), "tasks": tasks}
 
 
 def main(arguments: list[str]) -> int:
-    """Write the file of the version named, or of the newest."""
-    version = arguments[0] if arguments else VERSIONS[-1]
+    """Write the file of the version named, or of the first; of folders of assets, where some follow."""
+    version, *folders = arguments or [VERSIONS[0]]
     if version not in VERSIONS:
         raise unknown_name("protocol", version, VERSIONS)
-    content = document(version)
+    content = document_of_assets(version, built_assets(folders)) if folders else document(version)
     lines = json.dumps(content, indent=1)
     # An episode a line.
     lines = re.sub(r"\n {5,}", " ", lines).replace("\n    }", " }")

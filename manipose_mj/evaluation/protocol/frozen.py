@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from manipose_mj.errors import InputError, unknown_name
 
-VERSIONS = ("v1",)
-EPISODES = 100
+# Episodes of a task in each version.
+EPISODES = {"v1": 100, "v1-real": 50}
+VERSIONS = tuple(EPISODES)
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,15 @@ class FrozenTask:
       horizon: Time limit [s].
       tolerance: The fields of `Tolerance`, SI units and radians.
       settings: Digest of the whole configuration, ranges of places and the like.
-      episodes: 100 evaluation episodes, by name: `"v1/single_object/target_pose/000"`.
+      episodes: Evaluation episodes, by name: `"v1/single_object/target_pose/000"`.
+      pool: Names of the user's assets that they are drawn from, in this order; none where these are built in.
     """
 
     horizon: float
     tolerance: Mapping[str, float]
     settings: str
     episodes: Mapping[str, FrozenEpisode]
+    pool: tuple[str, ...] = ()
 
     @property
     def seeds(self) -> dict[str, int]:
@@ -63,17 +66,25 @@ class FrozenTask:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """The names of all built-in objects that the episodes use, sorted."""
+        """The names of all objects that the episodes use, sorted."""
         return tuple(sorted({name for each in self.episodes.values() for name in each.objects}))
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """Attributes: version: such as `"v1"`; sha256: of everything else; tasks: by `"domain/name"`."""
+    """A version.
+
+    Attributes:
+      version: Such as `"v1"`.
+      sha256: Of everything else.
+      tasks: By `"domain/name"`.
+      sources: Data set of each asset that users build themselves, by its name; empty where all are built in.
+    """
 
     version: str
     sha256: str
     tasks: Mapping[str, FrozenTask]
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def task(self, name: str) -> FrozenTask:
         """The task's part.
@@ -124,10 +135,13 @@ def load(version: str) -> Protocol:
                 f"{version}/{name}/{i:03d}": read_episode(entry)
                 for i, entry in enumerate(fields["episodes"])
             },
+            pool=tuple(fields.get("pool", ())),
         )
         for name, fields in document["tasks"].items()
     }
-    return Protocol(version, document["sha256"], tasks)
+    lists: Mapping[str, list[str]] = document.get("assets", {})
+    sources = {name: data_set for data_set, names in lists.items() for name in names}
+    return Protocol(version, document["sha256"], tasks, sources)
 
 
 def read_episode(entry: Mapping[str, Any]) -> FrozenEpisode:

@@ -19,6 +19,7 @@ from markupsafe import Markup
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.protocol.own_assets import pool_folders
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     read_results,
@@ -128,13 +129,20 @@ def _drawn(film: Film, out: Path, summary: dict[str, Any], scene: Scene) -> Film
         trajectory = read_trajectory(path)
         from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
-        objects, split = summary["objects"], summary["split"]
+        objects, split = _objects(result, summary), summary["split"]
         config = EnvConfig(result.task, obs_mode="state", objects=objects, split=split)
         model = scene(config, EpisodeSpec(**_asked(result, summary)))
         return shoot(film, model, trajectory, playback)
     except Exception as error:  # the numbers must not be lost for a picture
         logger.debug("episode %d of %s", result.episode, result.task, exc_info=True)
         return replace(film, note=f"no pictures: {' '.join(str(error).split())}")
+
+
+def _objects(result: EpisodeResult, summary: dict[str, Any]) -> Sequence[str] | None:
+    """What the task's environment drew from instead of built-in objects."""
+    if not summary.get("assets"):
+        return summary["objects"]
+    return pool_folders(summary["protocol"], result.task, summary["assets"])
 
 
 def _asked(result: EpisodeResult, summary: dict[str, Any]) -> dict[str, Any]:

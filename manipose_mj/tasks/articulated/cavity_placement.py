@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +12,8 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, Cavity, MovingPart
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
-from manipose_mj.tasks.articulated.hand_room import MAX_WIDTH, Placement, free_grasps
+from manipose_mj.tasks.articulated.hand_room import MAX_WIDTH, Placement
+from manipose_mj.tasks.articulated.part_room import cavity_of, outwards_of, room_at
 from manipose_mj.tasks.scene.object_pool import ObjectPool
 from manipose_mj.tasks.scene.resting import placements_between
 
@@ -22,10 +24,12 @@ GAP = 0.012
 _LIKELY = 0.06  # share of drops that end in a stable pose
 _LIFT = 0.001  # things are put down from this high [m]
 _TRIES = 40
-_MIN_GRASPS = 6  # with room for the hand, for an object to be put in or taken out
+MIN_GRASPS = 6  # with room for the hand, for an object to be put in or taken out
 _HALF_HAND = 0.115  # of its width, with some room [m]
 _MIN_CLEAR = 5  # grasps clear of the table with which a stable pose is one to start from
 _ROOM_FRONT = 0.04  # room is kept for an object this far from the open side at most [m]
+# From the middle of a cavity to its open side, where an object is tried, as shares of the free way.
+_DEPTHS = (0.0, 0.35, 0.7, 1.0, -0.35)
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -89,32 +93,6 @@ def starts(asset: Asset) -> tuple[int, ...]:
         return everything
     narrow = asset.grasps.clear[asset.grasps.widths < MAX_WIDTH]
     return tuple(i for i in everything if narrow[:, i].sum() >= _MIN_CLEAR) or everything
-
-
-def room_for_hand(
-    asset: Asset,
-    part: MovingPart,
-    stable: int,
-    lying: Resting,
-    place: Float[np.ndarray, "2"],
-    others: Sequence[Placement] = (),
-) -> int:
-    """How many grasps have room for the hand, from above, or for what is behind a door from the front.
-
-    Args:
-      asset: What lies there.
-      part: A drawer, open, or a door.
-      stable: Index of the stable pose it lies in.
-      lying: How it lies.
-      place: Where, from the cavity's centre [m].
-      others: What lies beside it.
-    """
-    cavity = _cavity(part)
-    outwards = _UP if cavity.moves_with_part else np.append(outwards_of(part), 0.0)
-    if asset.grasps is None:
-        return 0
-    pose = lying.pose(cavity, place)
-    return free_grasps(asset.grasps, stable, pose, cavity, outwards, others)
 
 
 def resting(asset: Asset, stable: int, yaw: float) -> Resting:
@@ -197,10 +175,10 @@ def ways_into(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
     Raises:
       InputError: There is none.
     """
-    ways = ways_to_lie(asset, _cavity(part))
+    ways = ways_to_lie(asset, cavity_of(part))
     if not ways:
         lengths = " x ".join(f"{1000 * v:.0f}" for v in asset.label.extents)
-        room = " x ".join(f"{1000 * v:.0f}" for v in _cavity(part).extents)
+        room = " x ".join(f"{1000 * v:.0f}" for v in cavity_of(part).extents)
         raise InputError(
             f"{asset.folder}: {asset.name} measures {lengths} mm and fits the cavity of "
             f"{part.name!r} ({room} mm) in no stable pose"
@@ -209,7 +187,7 @@ def ways_into(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
 
 
 def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
-    """Those of `ways_into` in which a hand can hold the asset, at least where it lies in the middle.
+    """Those of `ways_into` in which a hand can hold the asset, at least where it has most room.
 
     Raises:
       InputError: There is none.
@@ -217,8 +195,7 @@ def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...
     ways = tuple(
         (stable, yaw)
         for stable, yaw in ways_into(asset, part)
-        if room_for_hand(asset, part, stable, resting(asset, stable, yaw), np.zeros(2))
-        >= _MIN_GRASPS
+        if _roomiest(asset, part, stable, resting(asset, stable, yaw))[0] >= MIN_GRASPS
     )
     if not ways:
         raise InputError(
@@ -226,6 +203,29 @@ def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...
             "choose narrower objects"
         )
     return ways
+
+
+def _roomiest(
+    asset: Asset,
+    part: MovingPart,
+    stable: int,
+    lying: Resting,
+    cavity_world: Float[np.ndarray, "4 4"] | None = None,
+) -> tuple[int, Float[np.ndarray, "2"]]:
+    """Of a few places between a cavity's two sides, how many grasps have room at the best, and where that is."""
+    cavity = cavity_of(part)
+    slack = (cavity.extents - MARGIN)[:2] / 2 - lying.reach[:2]
+    # What is behind a door is held from the front: further in there is less room.
+    shares = _DEPTHS if cavity.moves_with_part else _DEPTHS[:1]
+    best, where = -1, np.zeros(2)
+    for share in shares:
+        place = share * slack * outwards_of(part)
+        count = room_at(asset, part, stable, lying.pose(cavity, place), cavity_world=cavity_world)
+        if count > best:
+            best, where = count, place
+        if best >= MIN_GRASPS:
+            break
+    return best, where
 
 
 @dataclass(frozen=True)
@@ -237,12 +237,14 @@ class OwnPlace:
       lying: How it lies.
       place: Of its box, from the cavity's centre [m].
       room: That is kept around it [m].
+      hands: How many of its grasps have room for the hand.
     """
 
     stable: int
     lying: Resting
     place: Float[np.ndarray, "2"]
     room: float
+    hands: int
 
     @property
     def kept(self) -> Placement:
@@ -269,35 +271,51 @@ class CavityPlacement:
         self._ways = [ways_into(asset, part) for asset in self._assets]
         self._own = (ways_in_hand if taken else ways_stored)(self._assets[0], part)
 
-    def inside(self, rng: np.random.RandomState, *, front: float, room: float = 0.0) -> OwnPlace:
-        """A place for the object in the empty cavity, with room for the hand where there is some.
+    def inside(
+        self,
+        rng: np.random.RandomState,
+        *,
+        front: float,
+        room: float = 0.0,
+        cavity_world: Float[np.ndarray, "4 4"] | None = None,
+    ) -> OwnPlace:
+        """A place for the object in the empty cavity, with room for the hand.
+
+        Near the open side; where nothing there leaves the hand room, as between a long tool and a drawer's front,
+        further in.
 
         Args:
           rng: Draws the way to lie and the place.
           front: At most this far from the open side [m].
           room: For fingers around it, towards walls and towards others [m].
+          cavity_world: As of `room_at`.
         """
-        part = self._part
+        asset, part = self._assets[0], self._part
         stable, yaw = self._own[rng.randint(len(self._own))]
-        lying = resting(self._assets[0], stable, yaw)
-        place, best = np.zeros(2), -1
-        for _ in range(_TRIES):
+        lying = resting(asset, stable, yaw)
+        best, place = -1, np.zeros(2)
+        deepest = (front, None) if cavity_of(part).moves_with_part else (front,)
+        for allowed, _ in product(deepest, range(_TRIES)):
             tried = sample_placement(
                 lying,
-                _cavity(part),
+                cavity_of(part),
                 [],
                 rng,
                 outwards=outwards_of(part),
-                front=front,
+                front=allowed,
                 room=room,
             )
             assert tried is not None  # it fits, and nothing is in its way
-            count = room_for_hand(self._assets[0], part, stable, lying, tried.place)
+            pose = lying.pose(cavity_of(part), tried.place)
+            count = room_at(asset, part, stable, pose, cavity_world=cavity_world)
             if count > best:
-                place, best = tried.place, count
-            if best >= _MIN_GRASPS:
-                break
-        return OwnPlace(stable, lying, place, room)
+                best, place = count, tried.place
+            if best >= MIN_GRASPS:
+                return OwnPlace(stable, lying, place, room, best)
+        count, roomiest = _roomiest(asset, part, stable, lying, cavity_world)
+        if count > best:
+            best, place = count, roomiest
+        return OwnPlace(stable, lying, place, room, best)
 
     def beside(
         self, rng: np.random.RandomState, count: int, own: OwnPlace | None = None
@@ -317,32 +335,19 @@ class CavityPlacement:
         part = self._part
         if own is None:
             own = self.inside(rng, front=_ROOM_FRONT)
-        enough = min(_MIN_GRASPS, self._room_beside(own, []))
+        enough = min(MIN_GRASPS, self._room_beside(own, []))
         taken, found = [own.kept], {}
         for other in 1 + rng.permutation(len(self._assets) - 1)[:count]:
             ways = self._ways[other]
             stable, yaw = ways[rng.randint(len(ways))]
             lying = resting(self._assets[other], stable, yaw)
-            place = sample_placement(lying, _cavity(part), taken, rng, outwards=outwards_of(part))
+            place = sample_placement(lying, cavity_of(part), taken, rng, outwards=outwards_of(part))
             if place is None or self._room_beside(own, [*taken[1:], place]) < enough:
                 continue
             taken.append(place)
-            found[int(other)] = lying.pose(_cavity(part), place.place)
+            found[int(other)] = lying.pose(cavity_of(part), place.place)
         return found
 
     def _room_beside(self, own: OwnPlace, others: Sequence[Placement]) -> int:
-        asset = self._assets[0]
-        return room_for_hand(asset, self._part, own.stable, own.lying, own.place, others)
-
-
-def outwards_of(part: MovingPart) -> Float[np.ndarray, "2"]:
-    """The open side of a part's cavity, along x or y of the object frame."""
-    assert part.handle is not None
-    outwards = part.handle.rotation[:2, 1]
-    axis = int(np.argmax(np.abs(outwards)))
-    return np.eye(2)[axis] * np.sign(outwards[axis])
-
-
-def _cavity(part: MovingPart) -> Cavity:
-    assert part.cavity is not None  # the furniture pool has seen to it
-    return part.cavity
+        asset, pose = self._assets[0], own.lying.pose(cavity_of(self._part), own.place)
+        return room_at(asset, self._part, own.stable, pose, others)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity, GraspSet
 from manipose_mj.assets.franka_hand import FINGER_OFFSET, HAND_BOXES, TCP_OFFSET
+from manipose_mj.mjcf.panda.reachability import is_reachable
 
 # A cosine: grasps must come through the open side, or nearly.
 _TOWARDS = 0.85
@@ -17,7 +18,15 @@ MAX_WIDTH = 0.0765  # between the pads [m]; they open 80 mm
 _OPENING = 0.006  # of each finger beside what it takes [m]
 # Of a finger, in the TCP's frame: half its width, its thickness, from where to where along the approach [m].
 _FINGER = (0.0105, 0.026, FINGER_OFFSET - TCP_OFFSET, 0.009)
+# The flange and the last link, in the hand's frame: half their widths, from where to where along the approach [m].
+_FLANGE = (0.045, -0.072, 0.018)
 _WALLS = 0.003  # kept from them [m]
+_PANEL = 0.04  # that a drawer's front stands higher than its cavity [m]
+_FRONT = (
+    0.022  # thickness of a front, by which a shut drawer is deeper in what it is pulled out of [m]
+)
+_STANDOFF = 0.06  # from which an object is approached, straight [m]
+_HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -36,6 +45,8 @@ def free_grasps(
     cavity: Cavity,
     outwards: Float[np.ndarray, "3"],
     others: Sequence[Placement] = (),
+    drawn: Float[np.ndarray, "2"] | None = None,
+    cavity_world: Float[np.ndarray, "4 4"] | None = None,
 ) -> int:
     """How many grasps of an object have room for hand and fingers where it lies.
 
@@ -46,9 +57,13 @@ def free_grasps(
       cavity: Where.
       outwards: Unit vector through its open side, in its frame.
       others: What lies beside it.
+      drawn: How far a drawer is pulled out, in its frame [m]; None: it is none.
+      cavity_world: `T_world_cavity`; the arm has to reach the grasps then. None: it may stand anywhere.
     """
+    if cavity_world is not None:
+        grasps = replace(grasps, clear=grasps.clear & _reached(cavity_world @ pose @ grasps.poses))
     hands = hands_around(grasps, stable, pose[:3, :3], outwards)
-    return count_clear(hands, pose[:3, 3], cavity, outwards, others)
+    return count_clear(hands, pose[:3, 3], cavity, outwards, others, drawn)
 
 
 def hands_around(
@@ -72,7 +87,7 @@ def hands_around(
     usable = grasps.clear[:, stable].astype(bool) & (grasps.widths < MAX_WIDTH)
     usable &= turned[:, :, 2] @ -outwards > _TOWARDS
     if not usable.any():
-        return np.zeros((0, 3, 8, 3))
+        return np.zeros((0, 4, 8, 3))
     hands = _hands(grasps.widths[usable])
     centers = grasps.poses[usable, :3, 3] @ rotation.T
     return np.einsum("kij,kbcj->kbci", turned[usable], hands) + centers[:, None, None]
@@ -84,6 +99,7 @@ def count_clear(
     cavity: Cavity,
     outwards: Float[np.ndarray, "3"],
     others: Sequence[Placement] = (),
+    drawn: Float[np.ndarray, "2"] | None = None,
 ) -> int:
     """How many hands of `hands_around` are clear of the walls and of what else lies there.
 
@@ -93,6 +109,7 @@ def count_clear(
       cavity: Where.
       outwards: Unit vector through its open side, in its frame.
       others: What lies beside the object.
+      drawn: How far a drawer is pulled out, in its frame [m]; None: it is none.
     """
     if not len(hands):
         return 0
@@ -100,6 +117,9 @@ def count_clear(
     # What is beyond the open side may be anywhere; the floor is the grasp's own affair.
     beyond = corners @ outwards > np.abs(outwards) @ half
     room = np.where(np.abs(outwards) > 0.5, np.inf, half - _WALLS)
+    if drawn is not None:
+        beyond &= _between_front_and_body(corners, half, drawn)
+        room[2] = half[2]
     within = (np.abs(corners[..., :2]) <= room[:2]).all(axis=-1) & (corners[..., 2] <= room[2])
     clear = (beyond | within).all(axis=(1, 2))
     low, high = corners.min(axis=2), corners.max(axis=2)
@@ -110,15 +130,40 @@ def count_clear(
     return int(clear.sum())
 
 
+def _reached(tcp_poses: Float[np.ndarray, "n 4 4"]) -> Bool[np.ndarray, "n 1"]:
+    """Whether the arm alone comes straight to each pose `T_world_tcp`, either way round."""
+    ways = np.stack([tcp_poses, tcp_poses @ _HALF_TURN], axis=1)
+    back = ways.copy()
+    back[..., :3, 3] -= _STANDOFF * back[..., :3, 2]
+    found = is_reachable(ways) & is_reachable(back)
+    return np.any(found, axis=1, keepdims=True)
+
+
+def _between_front_and_body(
+    corners: Float[np.ndarray, "k b 8 3"],
+    half: Float[np.ndarray, "3"],
+    drawn: Float[np.ndarray, "2"],
+) -> Bool[np.ndarray, "k b 8"]:
+    """Which corners above a drawer are clear of its front, and of what it is pulled out of."""
+    length = float(np.linalg.norm(drawn))
+    from_front = half[:2] @ np.abs(drawn) / length - corners[..., :2] @ (drawn / length)
+    over_front = corners[..., 2] > half[2] + _PANEL
+    return ((from_front > _WALLS) | over_front) & (from_front < length - _FRONT)
+
+
 def _hands(widths: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k b 8 3"]:
     """Corners of the hand and of its opening fingers around things of these widths, in the TCP's frame [m]."""
     half, thickness, back, front = _FINGER
     low, high = (np.array(corner) - [0, 0, TCP_OFFSET] for corner in HAND_BOXES[0])
     palm = low + _CORNERS * (high - low)
+    wide, top, bottom = _FLANGE
+    flange = np.array([-wide, -wide, top]) + _CORNERS * [2 * wide, 2 * wide, bottom - top]
+    flange = flange - [0, 0, TCP_OFFSET]
     boxes = [np.broadcast_to(palm, (len(widths), 8, 3))]
     inner, outer = widths / 2, widths / 2 + thickness + _OPENING
     for side in (-1.0, 1.0):
         near = np.stack([np.full_like(inner, -half), side * inner, np.full_like(inner, back)], 1)
         far = np.stack([np.full_like(inner, half), side * outer, np.full_like(inner, front)], 1)
         boxes.append(near[:, None] + _CORNERS * (far - near)[:, None])
+    boxes.append(np.broadcast_to(flange, (len(widths), 8, 3)))
     return np.stack(boxes, axis=1)

@@ -6,16 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.mjcf.markers.goal_area import GoalArea
-from manipose_mj.poses import compose
+from manipose_mj.poses import compose, invert
+from manipose_mj.tasks.articulated.cavity_placement import MIN_GRASPS
 from manipose_mj.tasks.articulated.cavity_task import CavityTask, placed_objects
+from manipose_mj.tasks.articulated.part_room import cavity_of, room_at
 from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
-from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start import EpisodeStart, NoStartError
 from manipose_mj.tasks.goals import ShutGoal, TakenOutGoal
+
+_SAME_SIDE = float(np.cos(np.radians(10)))  # between verticals, at rest and of a stable pose
+_SUNK = 0.006  # below the floor of a cavity, by which bars let things sink [m]
+_LEAST = MIN_GRASPS // 2  # grasps with room for the hand, once the object is at rest
 
 
 @dataclass(frozen=True)
@@ -71,15 +78,43 @@ class TakeOut(CavityTask):
     def observed_goals(self) -> tuple[str, ...]:
         return ("goal",)
 
+    def write(self, physics: mjcf.Physics, start: EpisodeStart) -> None:
+        """Put a simulation where an episode starts.
+
+        Raises:
+          NoStartError: An object does not come to rest, or at rest the one in question cannot be had any more: some
+            fall over on an oven's grid, spoons roll.
+        """
+        super().write(physics, start)
+        entity, piece = self.objects["object"], self.furniture.asset.name
+        pose = entity.object_pose(physics)
+        alike = [float(rest.rotation[2] @ pose[2, :3]) for rest in entity.asset.stable_poses]
+        if max(alike) < _SAME_SIDE:
+            raise NoStartError(f"{entity.asset.name} fell over in {piece}")
+        cavity, stable = self.cavity_pose(physics), int(np.argmax(alike))
+        at, room = invert(cavity) @ pose, cavity_of(self.part).extents
+        if at[2, 3] < entity.asset.stable_poses[stable].height - room[2] / 2 - _SUNK:
+            raise NoStartError(f"{entity.asset.name} fell through the grid of {piece}")
+        hands = room_at(entity.asset, self.part, stable, at, cavity_world=cavity)
+        if hands < _LEAST:
+            raise NoStartError(
+                f"{entity.asset.name} came to rest in {piece} where no hand gets at it"
+            )
+
     def sample(
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         config = self.task_config
         furniture, mount = self.pieces.sample(rng, 0)
         center = self.sample_place(rng, config.x_range, config.y_range)
-        own = self.placement.inside(rng, front=config.front, room=config.room)
-        fillers = self.sample_fillers(rng, own)
         cavity = self.cavity_of(preview, furniture)
+        own = self.placement.inside(rng, front=config.front, room=config.room, cavity_world=cavity)
+        if own.hands < MIN_GRASPS:
+            raise NoStartError(
+                f"{self.pool.entities[0].asset.name} lies in {self.furniture.asset.name} where {own.hands} of its "
+                f"grasps leave the hand room; expected {MIN_GRASPS}"
+            )
+        fillers = self.sample_fillers(rng, own)
         part = self.part.name
         assert self.part.cavity is not None
         inside = own.lying.pose(self.part.cavity, own.place)

@@ -47,8 +47,8 @@ class PileDraw:
         self._own = own is not None
         everything = builtin(split, rigid_rows(LONGEST)) if own is None else chosen(own)
         flat = builtin(split, [CATALOGUE[name] for name in _FLAT]) if own is None else []
-        self._any = Candidates(everything, require_graspable if own else _fit_for_piles)
-        self._flat = Candidates(flat, _fit_for_piles)
+        self._any = Candidates(everything, require_graspable if own else require_fit_for_piles)
+        self._flat = Candidates(flat, require_fit_for_piles)
         self._sets: dict[int, tuple[Asset, ...]] = {}
 
     def __call__(self, rng: np.random.RandomState, spec: EpisodeSpec) -> SceneObjects:
@@ -93,7 +93,8 @@ def pile_of(mixture: Mixture) -> ObjectDrawFactory:
     return make
 
 
-def _fit_for_piles(asset: Asset) -> None:
+def require_fit_for_piles(asset: Asset) -> None:
+    """Raise `InputError` for what is too long for a pile, or seldom comes to lie where a hand can take it."""
     require_graspable(asset)
     longest = float(asset.label.extents.max())
     if longest > LONGEST:

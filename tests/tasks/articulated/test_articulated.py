@@ -17,7 +17,9 @@ from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import compose, invert, transform
 from manipose_mj.tasks.articulated.cavity_placement import resting, ways_to_lie
 from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of, possible_parts
+from manipose_mj.tasks.articulated.part_room import outwards_of, room_at
 from manipose_mj.tasks.articulated.registered import OPENABLES
+from manipose_mj.tasks.core.start import NoStartError
 from manipose_mj.tasks.goals.conditions import inside_cavity
 from tests.few_objects import load
 from tests.places import REAL_DATA
@@ -226,3 +228,32 @@ def test_furniture_of_partnet_mobility_serves(tmp_path):
     environment.step(HOLD)
     assert task.max_penetration < 0.005
     assert not task.success_now
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("part", ["top_drawer", "cabinet_door"])
+def test_what_is_taken_out_lies_where_a_hand_gets_at_it(part):
+    environment = _load(f"take_out_{part}")
+    for seed in range(4):
+        task, physics = _reset(environment, seed)
+        entity, cavity = task.objects["object"], task.cavity_pose(physics)
+        pose = entity.object_pose(physics)
+        alike = [rest.rotation[2] @ pose[2, :3] for rest in entity.asset.stable_poses]
+        stable, at = int(np.argmax(alike)), invert(cavity) @ pose
+        assert room_at(entity.asset, task.part, stable, at, cavity_world=cavity) >= 3
+
+
+def test_a_start_in_which_no_hand_gets_at_the_object_is_none():
+    environment = _load("take_out_top_drawer")
+    task, physics = environment.task, environment.physics
+    placed, cavity = task.start.objects["object"], task.cavity_pose(physics)
+    at = invert(cavity) @ placed.pose
+    # To the wall at the back, which stays under what the drawer is pulled out of.
+    back = -outwards_of(task.part) * task.part.cavity.extents[:2]
+    reach = task.objects["object"].asset.label.reach(
+        at[:3, :3] @ task.objects["object"].asset.label.rotation
+    )
+    at[:2, 3] = back / 2 - np.sign(back) * (reach[:2] + 0.01)
+    objects = {**task.start.objects, "object": replace(placed, pose=cavity @ at)}
+    with pytest.raises(NoStartError, match="no hand gets at it"):
+        task.write(physics, replace(task.start, objects=objects))
