@@ -130,7 +130,9 @@ def check_scan_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> 
         log.warning("%s: %s; is the file damaged?", where, defect)
     if holes := open_edges(mesh):
         log.warning(
-            "%s: the surface has holes (%d open edges); contacts and mass need them closed", where, holes
+            "%s: the surface has holes (%d open edges); contacts and mass need them closed",
+            where,
+            holes,
         )
 
 
