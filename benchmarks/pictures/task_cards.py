@@ -29,7 +29,7 @@ WIDTH, HEIGHT, COLOURS = 400, 300, 128
 
 def head(spec: TaskSpec) -> str:
     """What a card says without building the task: names, docstring, objects, horizon, tolerances."""
-    frozen = protocol.load(protocol.VERSIONS[-1])
+    frozen = protocol.load(protocol.VERSIONS[0])
     fixed, tolerance = frozen.task(spec.full_name), frozen.task(spec.full_name).tolerance
     lines = [
         f"# `{spec.full_name}`",

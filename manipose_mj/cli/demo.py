@@ -49,7 +49,7 @@ def _claim(out: Path) -> None:
 
     Results that are not a demo's stay, and the evaluation then refuses the folder.
     """
-    from manipose_mj.evaluation.runner import RESULTS_FILE
+    from manipose_mj.evaluation.results_folder import RESULTS_FILE
 
     results = out / RESULTS_FILE
     mark = out / MARK

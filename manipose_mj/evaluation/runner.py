@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -12,7 +11,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
 from manipose_mj.control.perception.source_names import GraspSource
@@ -26,12 +25,19 @@ from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     Trajectory,
-    read_results,
     to_line,
     trajectory_path,
     write_atomically,
     write_sorted,
     write_trajectory,
+)
+from manipose_mj.evaluation.results_folder import (
+    RESULTS_FILE,
+    RUN_FILE,
+    SUMMARY_FILE,
+    append_result,
+    kept_results,
+    results_file,
 )
 from manipose_mj.evaluation.statistics import machine, summarize, versions
 from manipose_mj.policies.loading import load_policy, metadata_of
@@ -39,10 +45,6 @@ from manipose_mj.policies.protocol import PolicyRaisedError
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
-
-RESULTS_FILE = "results.jsonl"
-SUMMARY_FILE = "summary.json"
-RUN_FILE = "run.json"
 
 # Episodes of one process share their compiled environments, and a dask worker may have several threads.
 _one_at_a_time = Lock()
@@ -152,8 +154,8 @@ def evaluate(
         runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result
-    with cluster(config.dask), _results_file(config.out) as file:
-        results = _kept_results(config, identity, file, resume)
+    with cluster(config.dask), results_file(config.out) as file:
+        results = kept_results(config.out, identity, file, resume=resume)
         if not results:
             run = {
                 **identity,
@@ -173,7 +175,7 @@ def evaluate(
         total = len(config.tasks) * config.episodes
         on_progress(results, total)
         for result in _outcomes(config, runner, missing):
-            _append(file, result)
+            append_result(file, result)
             results.append(result)
             on_progress(results, total)
         write_sorted(config.out / RESULTS_FILE, results)
@@ -210,77 +212,6 @@ def _check_estimator(config: EvaluationConfig) -> None:
         if config.jobs > 1 or config.dask is not None:
             service.close()  # workers make their own
             load_estimator.cache_clear()
-
-
-@contextmanager
-def _results_file(out: Path) -> Iterator[IO[bytes]]:
-    """The open and locked results file; a disk that refuses becomes an `InputError`."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        file = (out / RESULTS_FILE).open("ab")
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
-    try:
-        with file:
-            _lock(file, out)
-            yield file
-    except OSError as error:
-        if error.filename is not None and not str(error.filename).startswith(str(out)):
-            raise
-        raise InputError(
-            f"{out}: cannot write results there ({error.strerror or error}); "
-            "those of finished episodes are safe: make room, then --resume goes on"
-        ) from None
-
-
-def _lock(file: IO[bytes], out: Path) -> None:
-    """Keep a second evaluation out of the folder; the lock goes with the process, however it ends."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise InputError(f"{out}: another evaluation is writing there; wait for it") from None
-
-
-def _kept_results(
-    config: EvaluationConfig, identity: dict[str, Any], file: IO[bytes], resume: bool
-) -> list[EpisodeResult]:
-    """The results to keep, with an unfinished last line cut off the file.
-
-    Raises:
-      InputError: There are results and `resume` is False, or they belong to another configuration.
-    """
-    results, size = read_results(config.out / RESULTS_FILE)
-    if results and not resume:
-        raise InputError(
-            f"{config.out}: holds {len(results)} results; add --resume or choose another --out"
-        )
-    if results:
-        try:
-            before = json.loads((config.out / RUN_FILE).read_text(encoding="utf-8"))
-        except (FileNotFoundError, ValueError):
-            raise InputError(
-                f"{config.out / RUN_FILE}: missing or unreadable, so that its results cannot be "
-                "continued; choose another --out"
-            ) from None
-        for name, value in identity.items():
-            if before.get(name) != value:
-                raise InputError(
-                    f"{config.out}: its results have {name} {before.get(name)!r}, this run has "
-                    f"{value!r}; resume with the same configuration or choose another --out"
-                )
-    file.truncate(size)
-    return results
-
-
-def _append(file: IO[bytes], result: EpisodeResult) -> None:
-    file.write(to_line(result).encode("utf-8"))
-    file.flush()
-    os.fsync(file.fileno())
 
 
 def _outcomes(

@@ -259,7 +259,7 @@ def test_a_task_that_the_baseline_cannot_do_ends_with_one_line(tmp_path, monkeyp
 
 def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
     frozen = frozen_seeds(TASK)
-    assert len(frozen) == 100
+    assert len(frozen) == 100 + 50  # of v1, and of its list of real scans
     with pytest.raises(InputError, match="is an evaluation seed of a protocol"):
         refuse_frozen(TASK, [5, min(frozen)])
     first = next(config(tmp_path).seeds())

@@ -22,7 +22,8 @@ from manipose_mj.evaluation.episode import environment_of, run_episode, run_poli
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.protocol import load as load_protocol
 from manipose_mj.evaluation.records import read_results
-from manipose_mj.evaluation.runner import RUN_FILE, evaluate
+from manipose_mj.evaluation.results_folder import RUN_FILE
+from manipose_mj.evaluation.runner import evaluate
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from tests.few_objects import config, few

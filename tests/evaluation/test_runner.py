@@ -168,8 +168,8 @@ def test_a_full_disk_is_an_input_error_and_keeps_what_ended(tmp_path: Path, monk
         written.append(result)
         original(file, result)
 
-    original = runner._append
-    monkeypatch.setattr(runner, "_append", append)
+    original = runner.append_result
+    monkeypatch.setattr(runner, "append_result", append)
     with pytest.raises(InputError, match="No space left on device"):
         evaluate(config(tmp_path), runner=fake.make_runner())
     monkeypatch.undo()

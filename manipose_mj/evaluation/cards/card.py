@@ -15,7 +15,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation.cards.markdown import OWN_CODE, card_markdown
 from manipose_mj.evaluation.cards.run_record import RunRecord, read_run
 from manipose_mj.evaluation.records import write_atomically
-from manipose_mj.evaluation.runner import RESULTS_FILE, RUN_FILE
+from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
 from manipose_mj.evaluation.statistics import summarize
 
 CARD_FILE, TEXT_FILE, SCHEMA_VERSION = "card.json", "card.md", 1

@@ -13,7 +13,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import EpisodeResult, read_results
-from manipose_mj.evaluation.runner import RESULTS_FILE, RUN_FILE
+from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from manipose_mj.evaluation.records import (
 )
 from manipose_mj.evaluation.report.film import WITH_GL, WITHOUT_GL, Film, choose, shoot
 from manipose_mj.evaluation.report.histograms import error_histograms
-from manipose_mj.evaluation.runner import RESULTS_FILE, SUMMARY_FILE
+from manipose_mj.evaluation.results_folder import RESULTS_FILE, SUMMARY_FILE
 from manipose_mj.evaluation.statistics import wilson_interval
 from manipose_mj.mjcf.cameras import gl
 from manipose_mj.tasks.goals import Tolerance

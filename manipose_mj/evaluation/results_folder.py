@@ -1,0 +1,89 @@
+"""The folder of an evaluation: one writer at a time, a line a result, and what was kept of a run that ended early."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.records import EpisodeResult, read_results, to_line
+
+RESULTS_FILE = "results.jsonl"
+SUMMARY_FILE = "summary.json"
+RUN_FILE = "run.json"
+
+
+@contextmanager
+def results_file(out: Path) -> Iterator[IO[bytes]]:
+    """The open and locked results file; a disk that refuses becomes an `InputError`."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file = (out / RESULTS_FILE).open("ab")
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
+    try:
+        with file:
+            _lock(file, out)
+            yield file
+    except OSError as error:
+        if error.filename is not None and not str(error.filename).startswith(str(out)):
+            raise
+        raise InputError(
+            f"{out}: cannot write results there ({error.strerror or error}); "
+            "those of finished episodes are safe: make room, then --resume goes on"
+        ) from None
+
+
+def _lock(file: IO[bytes], out: Path) -> None:
+    """Keep a second evaluation out of the folder; the lock goes with the process, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{out}: another evaluation is writing there; wait for it") from None
+
+
+def kept_results(
+    out: Path, identity: dict[str, Any], file: IO[bytes], *, resume: bool
+) -> list[EpisodeResult]:
+    """The results to keep, with an unfinished last line cut off the file.
+
+    Raises:
+      InputError: There are results and `resume` is False, or they belong to another configuration.
+    """
+    results, size = read_results(out / RESULTS_FILE)
+    if results and not resume:
+        raise InputError(
+            f"{out}: holds {len(results)} results; add --resume or choose another --out"
+        )
+    if results:
+        try:
+            before = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))
+        except (FileNotFoundError, ValueError):
+            raise InputError(
+                f"{out / RUN_FILE}: missing or unreadable, so that its results cannot be "
+                "continued; choose another --out"
+            ) from None
+        for name, value in identity.items():
+            if before.get(name) != value:
+                raise InputError(
+                    f"{out}: its results have {name} {before.get(name)!r}, this run has "
+                    f"{value!r}; resume with the same configuration or choose another --out"
+                )
+    file.truncate(size)
+    return results
+
+
+def append_result(file: IO[bytes], result: EpisodeResult) -> None:
+    """Add a line; it is on the disk when this returns."""
+    file.write(to_line(result).encode("utf-8"))
+    file.flush()
+    os.fsync(file.fileno())
