@@ -100,6 +100,7 @@ def certify_protocol(
     one_thread_per_process()
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import (
+        causes,
         load_certificates,
         save_certificates,
     )
@@ -117,11 +118,13 @@ def certify_protocol(
     with output.Progress("starts") as progress:
         for done, (start, outcome) in enumerate(certify(version, missing, jobs, assets), 1):
             known = known.with_outcome(start, outcome)
-            save_certificates(known, out)
+            save_certificates(known, protocol, out)
             progress.update(done, len(missing), f"{len(known.solved)} certified")
     console = output.standard_output()
     for (task, number), reason in sorted(known.unsolved.items()):
         console.print(f"{task} {number}: {reason}", soft_wrap=True)
+    for (task, stage), count in sorted(causes(known).items()):
+        console.print(f"{task}: {count} starts unsolved, stage {stage}", soft_wrap=True)
     console.print(f"{out}: {len(known.solved)} certified, {len(known.unsolved)} unsolved")
     return 0
 

@@ -144,7 +144,8 @@ class Baseline:
 
         Args:
           seed: Of the motion planner's samples.
-          plans: How many it may try; clutter has a number of its own, for each move there is a plan.
+          plans: How many it may try; in clutter, where each move has a plan, `MAX_FAILED_MOVES` times as many as
+            `MAX_PLANS` go into it.
 
         Raises:
           StageFailure: The baseline gives up; the stage says where.
@@ -204,7 +205,7 @@ class Baseline:
                 candidates = None
             except StageFailure as failure:
                 failures += 1
-                most = MAX_FAILED_MOVES if step_by_step else plans
+                most = MAX_FAILED_MOVES * plans // MAX_PLANS if step_by_step else plans
                 # In clutter the same plan may be carried out another way.
                 counts = acted or not step_by_step
                 if scene.perception.feels_joints and counts and not falls_short:

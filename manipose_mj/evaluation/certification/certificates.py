@@ -7,15 +7,17 @@ goal within the time limit. Whoever fails there fails at something that can be d
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.protocol.frozen import Protocol
+from manipose_mj.evaluation.protocol.frozen import Protocol, start_digest
 from manipose_mj.evaluation.records import write_atomically
 
+T = TypeVar("T")
 Key = tuple[str, int]  # a task's full name, and the number of the episode
 
 
@@ -25,7 +27,7 @@ class Certificate:
 
     Attributes:
       planner_seed: Of the motion planner.
-      plans: How many the baseline may try.
+      plans: The baseline's budget, as of `Baseline.actions`.
     """
 
     planner_seed: int
@@ -37,22 +39,26 @@ class Certificates:
     """What is known of a protocol's starts.
 
     Attributes:
-      protocol: The sha256 of the protocol that they are of.
+      version: Of the protocol.
       solved: By task and episode.
       unsolved: Of starts that no attempt solved: stage and reason of the last.
+      refused: Reasons of the starts that were drawn before in an episode's place, and that nobody solved.
     """
 
-    protocol: str
+    version: str
     solved: Mapping[Key, Certificate] = field(default_factory=dict)
     unsolved: Mapping[Key, str] = field(default_factory=dict)
+    refused: Mapping[Key, tuple[str, ...]] = field(default_factory=dict)
 
     def with_outcome(self, key: Key, outcome: Certificate | str) -> Certificates:
         """These and what an attempt at one more start came to."""
         solved = {each: value for each, value in self.solved.items() if each != key}
         unsolved = {each: value for each, value in self.unsolved.items() if each != key}
         if isinstance(outcome, str):
-            return Certificates(self.protocol, solved, {**unsolved, key: outcome})
-        return Certificates(self.protocol, {**solved, key: outcome}, unsolved)
+            unsolved[key] = outcome
+        else:
+            solved[key] = outcome
+        return replace(self, solved=solved, unsolved=unsolved)
 
 
 def certificates_path(version: str) -> Path:
@@ -63,55 +69,84 @@ def certificates_path(version: str) -> Path:
 def load_certificates(protocol: Protocol, path: Path | None = None) -> Certificates:
     """The certificates of a protocol's starts; none where there is no file.
 
+    Those of starts that the protocol has no more are left out: it may have been frozen anew since.
+
     Args:
       protocol: The protocol.
       path: Of the file; by default the one of this package.
 
     Raises:
-      InputError: The file is no such file, or of another protocol.
+      InputError: The file is no such file, or of another version.
     """
     path = certificates_path(protocol.version) if path is None else path
     if not path.exists():
-        return Certificates(protocol.sha256)
+        return Certificates(protocol.version)
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        known = Certificates(
-            document["protocol"],
-            {
-                (task, int(episode)): Certificate(**fields)
-                for task, episodes in document["solved"].items()
-                for episode, fields in episodes.items()
-            },
-            {
-                (task, int(episode)): reason
-                for task, episodes in document["unsolved"].items()
-                for episode, reason in episodes.items()
-            },
-        )
+        version = document["version"]
+        solved = _entries(document["solved"], lambda fields: (fields.pop("start"), fields))
+        unsolved = _entries(document["unsolved"], lambda f: (f["start"], f["reason"]))
+        refused = _entries(document["refused"], tuple)
+        certificates = {key: (start, Certificate(**rest)) for key, (start, rest) in solved.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a file of certificates ({error})") from None
-    if known.protocol != protocol.sha256:
-        raise InputError(
-            f"{path}: of a protocol with sha256 {known.protocol}, not of {protocol.version} with {protocol.sha256}"
-        )
-    return known
+    if version != protocol.version:
+        raise InputError(f"{path}: of protocol {version}, not of {protocol.version}")
+    starts = _start_digests(protocol)
+    return Certificates(
+        version,
+        {key: each for key, (start, each) in certificates.items() if starts.get(key) == start},
+        {key: reason for key, (start, reason) in unsolved.items() if starts.get(key) == start},
+        {key: reasons for key, reasons in refused.items() if key in starts},
+    )
 
 
-def save_certificates(known: Certificates, path: Path) -> None:
-    """Write the file whole; a task a section, an episode a line, in order."""
-    lines = [f'{{\n "protocol": {json.dumps(known.protocol)},\n "solved": {{']
-    lines += _sections({key: vars(each) for key, each in known.solved.items()})
-    lines += [' },\n "unsolved": {']
-    lines += _sections(known.unsolved)
-    lines += [" }\n}\n"]
-    write_atomically(path, "\n".join(lines).encode("utf-8"))
+def save_certificates(known: Certificates, protocol: Protocol, path: Path) -> None:
+    """Write the file whole; a task a section, an episode a line, in order.
+
+    Args:
+      known: What to write.
+      protocol: Of which it is: each line says of which start it speaks.
+      path: Of the file.
+    """
+    starts = _start_digests(protocol)
+    tables = {
+        "solved": {k: {"start": starts[k], **vars(each)} for k, each in known.solved.items()},
+        "unsolved": {k: {"start": starts[k], "reason": r} for k, r in known.unsolved.items()},
+        "refused": known.refused,
+    }
+    text = ",\n".join(f' "{name}": {{\n{_sections(table)} }}' for name, table in tables.items())
+    head = f'{{\n "version": {json.dumps(known.version)},\n'
+    write_atomically(path, f"{head}{text}\n}}\n".encode())
 
 
-def _sections(entries: Mapping[Key, Any]) -> list[str]:
-    tasks = sorted({task for task, _ in entries})
+def causes(known: Certificates) -> Counter[tuple[str, str]]:
+    """How many starts nobody solved, those that were drawn again too, by task and stage of the failure."""
+    reasons = [(task, reason) for (task, _), reason in known.unsolved.items()]
+    reasons += [(task, each) for (task, _), given in known.refused.items() for each in given]
+    return Counter((task, reason.partition(":")[0]) for task, reason in reasons)
+
+
+def _entries(sections: Any, read: Callable[[Any], T]) -> dict[Key, T]:
+    return {
+        (task, int(number)): read(entry)
+        for task, entries in sections.items()
+        for number, entry in entries.items()
+    }
+
+
+def _start_digests(protocol: Protocol) -> dict[Key, str]:
+    return {
+        (name, i): start_digest(task, episode)
+        for name, task in protocol.tasks.items()
+        for i, episode in enumerate(task.episodes.values())
+    }
+
+
+def _sections(entries: Mapping[Key, Any]) -> str:
     sections = []
-    for task in tasks:
+    for task in sorted({task for task, _ in entries}):
         episodes = sorted(number for name, number in entries if name == task)
         body = ",\n".join(f'   "{i:03d}": {json.dumps(entries[task, i])}' for i in episodes)
         sections.append(f"  {json.dumps(task)}: {{\n{body}\n  }}")
-    return [",\n".join(sections)] if sections else []
+    return ",\n".join(sections) + "\n" if sections else ""

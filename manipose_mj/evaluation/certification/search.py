@@ -15,12 +15,13 @@ from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.evaluation.protocol.own_assets import pool_folders
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
-ATTEMPTS = 2
+# Budgets of plans, each with a seed of its own: first what an evaluation has, at last three times as many.
+BUDGETS = (MAX_PLANS, MAX_PLANS, 3 * MAX_PLANS)
 
 
 def attempts(seed: int) -> tuple[Certificate, ...]:
     """What is tried in turn for an episode's seed: first what an evaluation does, then other samples."""
-    return tuple(Certificate((seed + i) % 2**32, MAX_PLANS) for i in range(ATTEMPTS))
+    return tuple(Certificate((seed + i) % 2**32, plans) for i, plans in enumerate(BUDGETS))
 
 
 def chosen_starts(

@@ -13,6 +13,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,7 @@ def document(version: str) -> dict[str, Any]:
         spec.full_name: {**frozen_settings(spec), "episodes": frozen_episodes(version, spec)}
         for spec in builtin_tasks()
     }
-    return _stated({"version": version, "tasks": dict(sorted(tasks.items()))})
+    return stated({"version": version, "tasks": dict(sorted(tasks.items()))})
 
 
 def document_of_assets(version: str, assets: Sequence[BuiltAsset]) -> dict[str, Any]:
@@ -135,7 +136,7 @@ def document_of_assets(version: str, assets: Sequence[BuiltAsset]) -> dict[str, 
     for asset in own:
         if asset.name in used:
             lists.setdefault(asset.data_set, []).append(asset.name)
-    return _stated({"version": version, "assets": lists, "tasks": tasks})
+    return stated({"version": version, "assets": lists, "tasks": tasks})
 
 
 def pool_for(spec: TaskSpec, assets: Sequence[Asset]) -> list[Asset]:
@@ -167,7 +168,8 @@ def _meets(require: Callable[[Asset], None], asset: Asset) -> bool:
     return True
 
 
-def _stated(content: dict[str, Any]) -> dict[str, Any]:
+def stated(content: dict[str, Any]) -> dict[str, Any]:
+    """A version's content with the hash of it, ahead of the tasks."""
     tasks = content.pop("tasks")
     return {**content, "sha256": digest({**content, "tasks": tasks}), "tasks": tasks}
 
@@ -178,6 +180,17 @@ def main(arguments: list[str]) -> int:
     if version not in VERSIONS:
         raise unknown_name("protocol", version, VERSIONS)
     content = document_of_assets(version, built_assets(folders)) if folders else document(version)
+    path = write_protocol(version, content)
+    sys.stdout.write(f"{path}: {len(content['tasks'])} tasks, sha256 {content['sha256']}\n")
+    return 0
+
+
+def write_protocol(version: str, content: dict[str, Any]) -> Path:
+    """Write a version's file.
+
+    Raises:
+      InputError: It cannot be written.
+    """
     lines = json.dumps(content, indent=1)
     # An episode a line.
     lines = re.sub(r"\n {5,}", " ", lines).replace("\n    }", " }")
@@ -186,8 +199,7 @@ def main(arguments: list[str]) -> int:
         path.write_text(lines + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    sys.stdout.write(f"{path}: {len(content['tasks'])} tasks, sha256 {content['sha256']}\n")
-    return 0
+    return path
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -162,7 +162,20 @@ def digest(document: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def evaluation_seed(version: str, task: str, index: int) -> int:
-    """The seed that the name of an evaluation episode stands for: 32 bits of its sha256."""
-    name = f"manipose_mj/{version}/{task}/{index:03d}"
+def start_digest(task: FrozenTask, episode: FrozenEpisode) -> str:
+    """Twelve digits that stand for all that a protocol says of one start, and change with any of it."""
+    rules = {name: getattr(task, name) for name in ("horizon", "tolerance", "settings", "pool")}
+    return digest({**rules, **asdict(episode)})[:12]
+
+
+def evaluation_seed(version: str, task: str, index: int, draw: int = 0) -> int:
+    """The seed that the name of an evaluation episode stands for: 32 bits of its sha256.
+
+    Args:
+      version: Of the protocol.
+      task: Its full name.
+      index: Of the episode.
+      draw: How many seeds before were given up because nobody could solve their starts.
+    """
+    name = f"manipose_mj/{version}/{task}/{index:03d}" + (f"/{draw}" if draw else "")
     return int.from_bytes(hashlib.sha256(name.encode("utf-8")).digest()[:4], "big")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import pytest
 
 from manipose_mj.cli.main import main
@@ -12,10 +15,13 @@ from manipose_mj.evaluation.certification import search
 from manipose_mj.evaluation.certification.certificates import (
     Certificate,
     Certificates,
+    causes,
     load_certificates,
     save_certificates,
 )
+from manipose_mj.evaluation.certification.redraw import redrawn
 from manipose_mj.evaluation.certification.search import attempts, chosen_starts, verify
+from manipose_mj.evaluation.protocol.frozen import digest, evaluation_seed, protocol_path
 from manipose_mj.failures import STAGES
 
 V1 = protocol.load("v1")
@@ -29,27 +35,58 @@ SAMPLE = [
 
 
 def test_the_file_comes_back_as_it_was_written(tmp_path):
-    known = Certificates(V1.sha256).with_outcome((TASK, 3), Certificate(7, 5))
+    known = Certificates("v1").with_outcome((TASK, 3), Certificate(7, 5))
     known = known.with_outcome((TASK, 4), "plan: no grasp").with_outcome(
         (TASK, 5), "grasp: it slipped"
     )
     known = known.with_outcome((TASK, 5), Certificate(9, 10))
-    save_certificates(known, tmp_path / "c.json")
+    known = replace(known, refused={(TASK, 5): ("plan: no path", "timeout: not done after 40 s")})
+    save_certificates(known, V1, tmp_path / "c.json")
     again = load_certificates(V1, tmp_path / "c.json")
     assert again == known
     assert again.solved == {(TASK, 3): Certificate(7, 5), (TASK, 5): Certificate(9, 10)}
     assert again.unsolved == {(TASK, 4): "plan: no grasp"}
-    assert load_certificates(V1, tmp_path / "none.json") == Certificates(V1.sha256)
+    assert load_certificates(V1, tmp_path / "none.json") == Certificates("v1")
+    assert causes(again) == {(TASK, "plan"): 2, (TASK, "timeout"): 1}
+
+
+def test_a_certificate_goes_with_its_start_and_stays_while_others_change(tmp_path):
+    known = Certificates("v1").with_outcome((TASK, 0), Certificate(1, 5))
+    known = known.with_outcome((TASK, 1), Certificate(2, 5)).with_outcome((TASK, 2), "plan: none")
+    save_certificates(known, V1, tmp_path / "c.json")
+    task = V1.task(TASK)
+    names = list(task.episodes)
+    episodes = {**task.episodes, names[1]: replace(task.episodes[names[1]], seed=1)}
+    changed = replace(V1, tasks={**V1.tasks, TASK: replace(task, episodes=episodes)})
+    assert load_certificates(changed, tmp_path / "c.json").solved == {(TASK, 0): Certificate(1, 5)}
+    longer = replace(V1, tasks={**V1.tasks, TASK: replace(task, horizon=task.horizon + 1)})
+    assert load_certificates(longer, tmp_path / "c.json") == Certificates("v1")
+
+
+def test_starts_that_nobody_solved_are_drawn_again_in_their_place_and_counted():
+    document = json.loads(protocol_path("v1").read_text(encoding="utf-8"))
+    known = Certificates("v1").with_outcome((TASK, 3), "plan: no grasp")
+    known = known.with_outcome((TASK, 4), Certificate(1, 5))
+    content, left = redrawn(document, known)
+    before, after = (each["tasks"][TASK]["episodes"] for each in (document, content))
+    assert [i for i in range(100) if before[i] != after[i]] == [3]
+    assert after[3]["object"] == before[3]["object"] and after[3]["seed"] == evaluation_seed(
+        "v1", TASK, 3, 1
+    )
+    assert content["sha256"] == digest(content) != document["sha256"]
+    assert left.refused == {(TASK, 3): ("plan: no grasp",)} and not left.unsolved
+    again, _ = redrawn(content, left.with_outcome((TASK, 3), "grasp: it slipped"))
+    assert again["tasks"][TASK]["episodes"][3]["seed"] == evaluation_seed("v1", TASK, 3, 2)
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         ("{", "not a file of certificates"),
-        ('{"protocol": "1", "solved": {"a": 3}, "unsolved": {}}', "not a file of certificates"),
+        ('{"version": "v1", "solved": {"a": 3}, "unsolved": {}}', "not a file of certificates"),
         (
-            '{"protocol": "1", "solved": {}, "unsolved": {}}',
-            "of a protocol with sha256 1, not of v1",
+            '{"version": "v0", "solved": {}, "unsolved": {}, "refused": {}}',
+            "of protocol v0, not of v1",
         ),
     ],
 )
@@ -72,6 +109,7 @@ def test_starts_are_chosen_by_task_and_number():
 def test_the_first_attempt_is_what_an_evaluation_plays():
     assert attempts(2**32 - 1)[0] == Certificate(2**32 - 1, MAX_PLANS)
     assert attempts(2**32 - 1)[1].planner_seed == 0
+    assert attempts(0)[-1].plans > MAX_PLANS
 
 
 def test_shipped_certificates_are_of_starts_that_exist():
@@ -102,10 +140,10 @@ def test_commands_find_and_replay(tmp_path, capsys):
 def test_a_certificate_that_no_longer_holds_is_exit_1_with_its_reason(
     tmp_path, capsys, monkeypatch
 ):
-    known = Certificates(V1.sha256)
+    known = Certificates("v1")
     for number in (0, 1):
         known = known.with_outcome((TASK, number), Certificate(number, MAX_PLANS))
-    save_certificates(known.with_outcome((TASK, 2), "plan: no grasp"), tmp_path / "c.json")
+    save_certificates(known.with_outcome((TASK, 2), "plan: no grasp"), V1, tmp_path / "c.json")
     outcomes = [((TASK, 1), known.solved[TASK, 1]), ((TASK, 0), "grasp: it slipped")]
     monkeypatch.setattr(search, "verify", lambda *_: iter(outcomes))
     words = ["--tasks", TASK, "--episodes", "4", "--certificates", str(tmp_path / "c.json")]
