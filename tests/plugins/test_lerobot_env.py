@@ -106,10 +106,12 @@ def test_its_success_is_that_of_our_evaluation(environment_class):
     for number, episode in enumerate(frozen):
         spec = EpisodeSpec(**episode.asked)
         tape, here = TapedBaseline(), environment_of(plain)
-        play(here, tape, spec, Rules(), Naming(TASK, number, "oracle"))
+        play(here, tape, spec, Rules(), Naming(TASK, number, "oracle", "none"))
         targets = slowed(np.array(tape.taken), 10.0)
         rules = Rules(10.0, stop="success")
-        result, _ = play(here, SteppedPolicy(targets), spec, rules, Naming(TASK, number, "none"))
+        result, _ = play(
+            here, SteppedPolicy(targets), spec, rules, Naming(TASK, number, "none", "none")
+        )
         ours.append(result.success_at_end)
         there.reset(seed=number, options=NEW)
         ended, step = False, 0
