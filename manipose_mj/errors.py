@@ -13,6 +13,10 @@ class InputError(ValueError):
     """
 
 
+class ServerAbsentError(InputError):
+    """Nobody answers at the address of a method's server, or somebody else does."""
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     """An `InputError` for a misspelt name, offering the nearest valid ones.
 

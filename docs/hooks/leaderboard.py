@@ -11,6 +11,7 @@ LEADERBOARD = ROOT / "leaderboard"
 # Read, not imported: the site is built where the package is not installed.
 PROTOCOLS = ROOT / "manipose_mj" / "evaluation" / "protocol"
 PAGE, PLACE = "results/leaderboard.md", "<!-- cards -->"
+METHOD = "- Method: "  # the line of `card.md` that tells it
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
@@ -23,18 +24,24 @@ def tables(folder: Path = LEADERBOARD) -> str:
     rows, texts = [], []
     for path in sorted(folder.glob("*/card.json")):
         card = json.loads(path.read_text(encoding="utf-8"))
-        rows += [_row(card, run) for run in card["runs"]]
         text = path.with_name("card.md").read_text(encoding="utf-8")
+        rows += [_row(card, run, _method(text)) for run in card["runs"]]
         # One level lower: the page has a title of its own.
         texts.append(
             "\n".join(f"#{line}" if line.startswith("#") else line for line in text.splitlines())
         )
-    head = "| method | seeds | tasks | episodes | at end | once | training data |"
-    rule = "| --- | --- | ---: | ---: | ---: | ---: | --- |"
+    head = "| method | seeds | tasks | episodes | at end | once | what it is and was told | training data |"
+    rule = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
     return "\n".join([head, rule, *rows]) + "\n\n" + "\n\n".join(texts)
 
 
-def _row(card: dict[str, Any], run: dict[str, Any]) -> str:
+def _method(text: str) -> str:
+    """What `card.md` says of the method, for a cell of a table."""
+    (line,) = [each for each in text.splitlines() if each.startswith(METHOD)]
+    return line.removeprefix(METHOD).replace("|", "\\|")
+
+
+def _row(card: dict[str, Any], run: dict[str, Any], method: str) -> str:
     seeds = "frozen" if run["resample"] is None else f"resampled from {run['resample']}"
     episodes = sum(task["n"] for task in run["tasks"].values())
     protocol = json.loads((PROTOCOLS / f"{run['protocol']}.json").read_text(encoding="utf-8"))
@@ -43,5 +50,6 @@ def _row(card: dict[str, Any], run: dict[str, Any]) -> str:
     name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
     return (
         f"| {name} | {run['protocol']}, {seeds} | {covered} | {episodes} | "
-        f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {card['training_data']} |"
+        f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {method} | "
+        f"{card['training_data']} |"
     )

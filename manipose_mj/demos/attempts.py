@@ -93,7 +93,7 @@ def attempt(config: EnvConfig, seed: int, number: int, folder: Path, *, failures
     """
     environment, policy = environment_of(config), TapedBaseline()
     tape = StateTape(environment)
-    naming = Naming(config.task, number, policy.pose_source)
+    naming = Naming(config.task, number, policy.pose_source, policy.mask_source)
     result, _ = play(
         environment, policy, EpisodeSpec(seed), Rules(), naming, after_step=tape.record
     )

@@ -114,7 +114,7 @@ def export(
       on_progress: Called with the number of episodes done and of all.
 
     Raises:
-      InputError: The sets do not fit one data set, or LeRobot is not installed.
+      InputError: The sets do not fit one data set, a file is broken, or LeRobot is not installed.
     """
     sources = [(demos, each) for demos in sets for each in demos.episodes if each.success]
     if any(each.control_mode != RECORDED_MODE for _, each in sources):
@@ -125,10 +125,13 @@ def export(
         raise InputError(
             "states of these tasks differ in length; export them one by one, or with --obs-mode state+rgb"
         )
+    # All, before anything is written: a broken file shall leave no part of a data set behind.
+    recorded = [slowed(read_actions(demos, episode), config.hz) for demos, episode in sources]
     writer = open_writer(config, layouts[0])
     written, frames = 0, 0
-    for done, (demos, episode) in enumerate(sources, start=1):
-        actions = slowed(read_actions(demos, episode), config.hz)
+    for done, ((demos, episode), actions) in enumerate(
+        zip(sources, recorded, strict=True), start=1
+    ):
         seen, success = _replayed(_env_config(demos, config), episode.episode_seed, actions, config)
         if success:
             for observation, action in zip(seen, actions, strict=False):

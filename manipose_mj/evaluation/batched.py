@@ -198,6 +198,7 @@ def _result(
         seed=config.episode_seed(task, episode),
         object=name,
         pose_source=config.pose_source,
+        mask_source=config.mask_source,
         success_once=bool(ends.once[world]),
         success_at_end=success,
         failure=failure,

@@ -15,6 +15,7 @@ from manipose_mj.control.perception.source_names import (
     GRASP_SOURCES,
     GraspSource,
     default_grasps,
+    masks_of,
 )
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -26,6 +27,14 @@ from manipose_mj.evaluation.protocol.own_assets import digest_of, find_assets, p
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+
+# What a source of poses means for objects and for furniture.
+_POSES_OF = {
+    "oracle": ("true", "true"),
+    "estimated": ("estimated", "estimated"),
+    "estimated_objects": ("estimated", "true"),
+    "none": ("none", "none"),
+}
 
 
 @dataclass(frozen=True)
@@ -190,22 +199,22 @@ class EvaluationConfig:
         """What of a scene the policy knows truly, by estimates or not at all, for reports."""
         wrong = f", {self.errors.of_poses}" if self.errors.of_poses else ""
         if self.policy is not None:
-            source = "true" if self.policy.sees_true_poses else "none"
-            return {"objects": source + wrong, "furniture": source}
-        objects = "true" if self.pose == "oracle" else "estimated"
+            objects, furniture = _POSES_OF[self.policy.pose_source]
+            return {"objects": objects + wrong, "furniture": furniture}
+        objects, furniture = _POSES_OF[self.pose]
         if self.estimator is not None:
             objects = self.estimator.source
-        return {
-            "objects": objects + wrong,
-            "furniture": "estimated" if self.pose == "estimated" else "true",
-        }
+        return {"objects": objects + wrong, "furniture": furniture}
 
     @property
     def pose_source(self) -> str:
-        """Where object poses come from, as far as the configuration tells."""
-        if self.policy is None:
-            return self.pose
-        return "oracle" if self.policy.sees_true_poses else "none"
+        """Where object poses come from; of a policy, once `attachment` says whether it is given the simulator."""
+        return self.pose if self.policy is None else self.policy.pose_source
+
+    @property
+    def mask_source(self) -> str:
+        """Where instance masks come from, likewise."""
+        return masks_of(self.pose) if self.policy is None else self.policy.mask_source
 
     @property
     def split(self) -> Split:
@@ -263,7 +272,7 @@ class EvaluationConfig:
             "tasks": sorted(self.tasks),
             "episodes": self.episodes,
             "seed": self.seed,
-            "pose": self.pose,
+            "pose": self.pose_source,
             "objects": None if self.objects is None else list(self.objects),
             "protocol": self.protocol,
             "protocol sha256": self.protocol and protocol.load(self.protocol).sha256,

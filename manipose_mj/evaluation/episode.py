@@ -15,12 +15,12 @@ from dm_control import composer
 from manipose_mj import suite
 from manipose_mj.control.baseline import MAX_PLANS
 from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
-from manipose_mj.control.perception.source_names import GraspSource
+from manipose_mj.control.perception.source_names import GraspSource, masks_of
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
-from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.policy_settings import PolicySettings, attachment_of
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
 from manipose_mj.evaluation.rollout import Outcome, Rollout, Rules
 from manipose_mj.failures import StageFailure
@@ -70,7 +70,7 @@ def run_episode(
     """
     environment = environment_of(config)
     policy = _baseline(config, pose, plans, planner, estimator, errors, grasps)
-    naming = Naming(config.task, episode, pose)
+    naming = Naming(config.task, episode, pose, masks_of(pose))
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 
 
@@ -97,22 +97,23 @@ def run_policy_episode(
       PolicyRaisedError: The policy's code failed.
     """
     policy = _Guarded(load_policy(settings.name, settings.arguments))
-    attached = policy.privileged
-    source = getattr(policy.policy, "pose_source", "oracle") if attached else "none"
-    if settings.sees_true_poses:
-        source = "oracle"
+    settings = replace(settings, attachment=attachment_of(policy.policy))
     rules = Rules(settings.hz, settings.execute, settings.stop)
-    naming = Naming(config.task, episode, source)
+    naming = Naming(config.task, episode, settings.pose_source, settings.mask_source)
     return play(environment_of(config), policy, spec, rules, naming, settings)
 
 
 @dataclass(frozen=True)
 class Naming:
-    """What an episode's result copies. Attributes: task; episode: its index; pose_source: where poses came from."""
+    """What an episode's result copies.
+
+    Attributes: task; episode: its index; pose_source: where poses came from; mask_source: where instance masks did.
+    """
 
     task: str
     episode: int
     pose_source: str
+    mask_source: str
 
 
 def play(
@@ -216,6 +217,7 @@ def _result(
         seed=seed,
         object=task.object_name,
         pose_source=naming.pose_source,
+        mask_source=naming.mask_source,
         success_once=task.success_once,
         success_at_end=success,
         failure=None if success or failure is None else failure.stage,
@@ -244,7 +246,7 @@ class _Guarded:
 
     def __init__(self, policy: Policy) -> None:
         self.policy = policy
-        self.privileged = callable(getattr(policy, "attach", None))
+        self.privileged = attachment_of(policy) is not None
 
     def attach(self, environment: composer.Environment) -> None:
         if self.privileged:

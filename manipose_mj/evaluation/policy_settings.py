@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from manipose_mj.control.perception.source_names import MASK_SOURCES, POSE_SOURCES
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.tasks.observations.ground_truth import told_by_all
 
 Stop = Literal["success", "horizon"]
 STOPS: tuple[Stop, ...] = ("success", "horizon")
 ObsFormat = Literal["manipose", "droid"]
 OBS_FORMATS: tuple[ObsFormat, ...] = ("manipose", "droid")
 CONTROL_HZ = 50.0
-# Modes that tell what no sensor of a real robot does.
-_TRUE_POSES = ("pose", "segmentation")
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A policy that was given the simulator, by its method `attach`, and what it says that it takes from there.
+
+    Attributes: pose_source: of `POSE_SOURCES`; mask_source: of `MASK_SOURCES`.
+    """
+
+    pose_source: str = "oracle"
+    mask_source: str = "oracle"
 
 
 @dataclass(frozen=True)
@@ -29,6 +41,8 @@ class PolicySettings:
       execute: Of each answer's actions, how many are carried out; None: all.
       obs_format: Names of observations, and the sign of the gripper's command.
       stop: `"success"`: an episode ends once the goal has held for half a second; `"horizon"`: at its time limit.
+      attachment: What a policy that is given the simulator takes from there; None where it is not given. An
+        evaluation sets it once it has made the policy.
 
     Raises:
       InputError: A value that cannot be.
@@ -42,6 +56,7 @@ class PolicySettings:
     execute: int | None = None
     obs_format: ObsFormat = "manipose"
     stop: Stop = "success"
+    attachment: Attachment | None = None
 
     def __post_init__(self) -> None:
         if not self.obs_mode:
@@ -69,14 +84,26 @@ class PolicySettings:
             )
 
     @property
-    def sees_true_poses(self) -> bool:
-        """Whether its observations tell what only a simulator knows."""
-        return tells_true_poses(self.obs_mode)
+    def pose_source(self) -> str:
+        """Where it takes object poses from: a pose source of the baseline's, or `"none"`."""
+        if told_by_all(self.obs_mode).poses:
+            return "oracle"
+        return "none" if self.attachment is None else self.attachment.pose_source
+
+    @property
+    def mask_source(self) -> str:
+        """Where it takes instance masks from: `"oracle"`, the simulator, or `"none"`."""
+        if told_by_all(self.obs_mode).masks:
+            return "oracle"
+        return "none" if self.attachment is None else self.attachment.mask_source
 
     @property
     def identity(self) -> dict[str, Any]:
         """What two runs must share for their results to belong together; JSON."""
-        return dict(vars(self))
+        given = dict(vars(self))
+        attachment = given.pop("attachment")
+        # Runs of policies that are not given the simulator say nothing of it, nor did they ever.
+        return given if attachment is None else {**given, "attachment": dict(vars(attachment))}
 
     @property
     def words(self) -> list[str]:
@@ -91,9 +118,32 @@ class PolicySettings:
         return [*words, "--obs-format", self.obs_format, "--stop", self.stop]
 
 
-def tells_true_poses(obs_mode: str) -> bool:
-    """Whether observations of a mode tell what only a simulator knows: poses, or which pixel is which object."""
-    return any(
-        part.split("/")[0] in _TRUE_POSES or part.startswith("pointcloud/")
-        for part in obs_mode.split("+")
+def settings_of(identity: Mapping[str, Any]) -> PolicySettings:
+    """The settings of an `identity`, such as a run's record holds.
+
+    Raises:
+      InputError: It is none.
+    """
+    try:
+        attachment = identity.get("attachment")
+        given = None if attachment is None else Attachment(**attachment)
+        return PolicySettings(**{**identity, "attachment": given})
+    except (AttributeError, TypeError) as error:
+        raise InputError(f"no settings of a policy ({error})") from None
+
+
+def attachment_of(policy: object) -> Attachment | None:
+    """What a policy takes from the simulator; None for one that does not ask for it.
+
+    Its attributes `pose_source` and `mask_source` say so. Where they are missing or no known name, all is true.
+
+    Args:
+      policy: Anybody's.
+    """
+    if not callable(getattr(policy, "attach", None)):
+        return None
+    poses, masks = getattr(policy, "pose_source", None), getattr(policy, "mask_source", None)
+    return Attachment(
+        poses if isinstance(poses, str) and poses in POSE_SOURCES else "oracle",
+        masks if isinstance(masks, str) and masks in MASK_SOURCES else "oracle",
     )

@@ -31,8 +31,8 @@ class EpisodeResult:
       episode: Index within the evaluation, from 0.
       seed: The episode's own seed.
       object: Name of the manipulated asset.
-      pose_source: Where the policy took object poses from: `"oracle"` from the simulator, `"estimated"`, or
-        `"none"` where it got none.
+      pose_source: Where the policy took object poses from: `"oracle"` from the simulator, `"estimated"`,
+        `"estimated_objects"`, or `"none"` where it got none.
       success_once: The goal was met at some control step.
       success_at_end: The goal was met when the episode ended.
       failure: A member of `STAGES`, or None on success at the end.
@@ -50,6 +50,8 @@ class EpisodeResult:
       decisions: Times the policy was asked.
       clipped_actions: Actions with a number beyond its limit.
       policy_s: Wall-clock time in the policy, of `wall_s` [s].
+      mask_source: Where it took instance masks from: `"oracle"` from the simulator, or `"none"` where it got none;
+        None in older records.
     """
 
     task: str
@@ -72,6 +74,7 @@ class EpisodeResult:
     decisions: int = 0
     clipped_actions: int = 0
     policy_s: float = 0.0
+    mask_source: str | None = None
 
     def __post_init__(self) -> None:
         if self.failure is not None and self.failure not in STAGES:
@@ -107,6 +110,7 @@ _SINCE = {
     "decisions": 0,
     "clipped_actions": 0,
     "policy_s": 0.0,
+    "mask_source": None,
 }
 
 

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
 from manipose_mj.control.perception.source_names import GraspSource
-from manipose_mj.errors import InputError, ServerLostError, WorkerDiedError
+from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, WorkerDiedError
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
-from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.policy_settings import PolicySettings, attachment_of
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     Trajectory,
@@ -146,7 +146,7 @@ def evaluate(
       WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
     config.check_assets()
-    metadata = _checked_policy(config)
+    config, metadata = _checked_policy(config)
     _check_estimator(config)
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
@@ -159,6 +159,7 @@ def evaluate(
         if not results:
             run = {
                 **identity,
+                "masks": config.mask_source,
                 "policy metadata": metadata,
                 "jobs": config.jobs,
                 "command": config.command,
@@ -183,14 +184,16 @@ def evaluate(
     return sorted(results, key=lambda r: r.key)
 
 
-def _checked_policy(config: EvaluationConfig) -> dict[str, Any]:
-    """What the policy says of itself, if it says something; nothing is written before it can be had.
+def _checked_policy(config: EvaluationConfig) -> tuple[EvaluationConfig, dict[str, Any]]:
+    """The evaluation with what its policy takes from the simulator, and what the policy says of itself.
+
+    Nothing is written before the policy can be had.
 
     Raises:
       InputError: It cannot, or its observations are none of a task's.
     """
     if config.policy is None:
-        return {}
+        return config, {}
     for task in config.tasks:
         config.env_config(task)  # misspelt modes
     policy = load_policy(config.policy.name, config.policy.arguments)
@@ -202,7 +205,10 @@ def _checked_policy(config: EvaluationConfig) -> dict[str, Any]:
     if config.jobs > 1 or config.dask is not None:
         load_policy.cache_clear()  # workers make their own
         getattr(policy, "close", lambda: None)()
-    return metadata_of(policy)
+    # In batched worlds nobody attaches a policy.
+    attachment = attachment_of(policy) if config.batch is None else None
+    told = replace(config, policy=replace(config.policy, attachment=attachment))
+    return told, metadata_of(policy)
 
 
 def _check_estimator(config: EvaluationConfig) -> None:
@@ -265,6 +271,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
 
     Raises:
       InputError: The episode's input is wrong, or its trajectory cannot be written.
+      ServerLostError: The server of a method is not there any more.
     """
     path = trajectory_path(config.out, task, episode)
     start = time.perf_counter()
@@ -275,11 +282,12 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
-    except (InputError, OSError, MemoryError):
-        raise
-    except ServerLostError as error:
+    except (ServerLostError, ServerAbsentError) as error:
+        # A worker that finds no server comes late: the evaluation spoke with it before the first episode.
         advice = "finished episodes are kept: start it again and repeat with --resume"
         raise ServerLostError(f"{error}; {advice}") from None
+    except (InputError, OSError, MemoryError):
+        raise
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)
         write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))
@@ -299,6 +307,7 @@ def _crashed(
         seed=config.episode_seed(task, episode),
         object="",
         pose_source=config.pose_source,
+        mask_source=config.mask_source,
         success_once=False,
         success_at_end=False,
         failure="policy" if of_policy else "physics",
@@ -316,8 +325,8 @@ def _summary(config: EvaluationConfig, results: list[EpisodeResult]) -> dict[str
     settings = {k: v for k, v in config.identity.items() if k not in ("tasks", "episodes")}
     settings["split"] = config.split
     settings["assets"] = list(config.assets)
-    settings["pose"] = config.pose_source
     settings["poses"] = config.poses
+    settings["masks"] = config.mask_source
     settings["grasps"] = config.grasp_source
     return {
         "tasks": summarize(results),

@@ -11,7 +11,7 @@ from dm_control import composer
 from manipose_mj.control.baseline import MAX_PLANS, Baseline
 from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.pose_sources import check_pose_source
-from manipose_mj.control.perception.source_names import GraspSource
+from manipose_mj.control.perception.source_names import GraspSource, masks_of
 from manipose_mj.control.planning.planner import TaskPlanner
 from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
@@ -25,6 +25,7 @@ class BaselinePolicy:
 
     Attributes:
       pose_source: Where it takes object poses from.
+      mask_source: Where it takes instance masks from.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class BaselinePolicy:
           InputError: There is no such source of poses.
         """
         check_pose_source(pose)
-        self.pose_source = pose
+        self.pose_source, self.mask_source = pose, masks_of(pose)
         self._planner, self._plans = planner, plans
         self._estimator, self._errors = estimator, errors
         self._grasps: GraspSource | None = grasps

@@ -9,7 +9,7 @@ from typing import Any
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.errors import ServerAbsentError, ServerLostError
 from manipose_mj.wire.framing import pack, unpack
 
 SCHEMES = ("ws://", "wss://")
@@ -62,7 +62,7 @@ class Client:
         """Connect and read the metadata; nothing where that was done already.
 
         Raises:
-          InputError: Nobody answers, or not with a dictionary.
+          ServerAbsentError: Nobody answers, or not with a dictionary.
           ServerLostError: Somebody did before.
         """
         self._opened()
@@ -71,7 +71,7 @@ class Client:
         """The server's answer.
 
         Raises:
-          InputError: Nobody answers, or not with a dictionary.
+          ServerAbsentError: Nobody answers, or not with a dictionary.
           ServerLostError: The connection broke, or nothing came in time.
           RemoteFailureError: The server reports an error by text, or what came is no message. Close after it:
             most servers hang up.
@@ -125,7 +125,7 @@ class Client:
         self.close()
         if self._reached:
             return ServerLostError(f"{self.address}: the {self.kind} answers no more ({reason})")
-        return InputError(f"{self.address}: no {self.kind} answers there ({reason})")
+        return ServerAbsentError(f"{self.address}: no {self.kind} answers there ({reason})")
 
 
 def _reason(error: Exception) -> str:

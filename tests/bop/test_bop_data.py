@@ -143,13 +143,25 @@ def test_what_is_missing_counts_as_missed_and_the_surest_counts(data, tmp_path):
     assert scored(data, [*lines, ",".join(words)], tmp_path)["bowl"]["mssd"] == 0.5
 
 
+def _with_nan(name):
+    """An edit that makes the first number of a field NaN."""
+
+    def edit(lines):
+        fields = lines[1].split(",")
+        column = HEAD.split(",").index(name)
+        fields[column] = " ".join(["nan", *fields[column].split()[1:]])
+        return [lines[0], ",".join(fields)]
+
+    return edit
+
+
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
         (lambda lines: [HEAD.replace(",t,", ",T,"), *lines[1:]], "no column 't'"),
-        (
-            lambda lines: [lines[0], lines[1].replace(",0.9,", ",nan,")],
-            "line 2: score is not finite",
+        *(
+            (_with_nan(name), f"line 2: {name} is not finite")
+            for name in ("score", "R", "t", "time")
         ),
         (lambda lines: [lines[0], lines[1].replace(",0.1", "")], "line 2 has 6 fields; expected 7"),
         (lambda lines: [lines[0], lines[1].replace(",0.1", ",soon")], "line 2: could not convert"),

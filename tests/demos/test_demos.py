@@ -267,10 +267,20 @@ def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
     assert next(config(tmp_path).seeds())[0] == 1
 
 
+READERS = {
+    "replay": "demos replay {data} --jobs 1",
+    "export": "demos export {data} --out {out}",
+    "play": f"evaluate {TASK} --jobs 1 --seed 1 --episodes 1 --hz 50 --objects {' '.join(OBJECTS)} "
+    "--policy manipose_mj.demos.playback:RecordedPolicy --out {out} --policy-args",
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
         (lambda path: path.write_bytes(path.read_bytes()[:3000]), "no whole HDF5 file"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-1]), "no whole HDF5 file"),
         (lambda path: path.write_bytes(b"hello"), "no whole HDF5 file"),
         (lambda path: path.unlink(), "no whole HDF5 file|holds no demonstrations"),
         (lambda path: path.with_suffix(".json").unlink(), "no description of demonstrations"),
@@ -278,18 +288,28 @@ def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
         (lambda path: path.with_suffix(".json").write_text('{"env_'), "no description"),
         (lambda path: _without(path, "traj_1"), "lacks traj_1"),
         (lambda path: _without(path, "traj_0/actions"), "no whole HDF5 file"),
+        (lambda path: _without(path, "traj_0/actions", 5), r"has actions of shape \(5, 8\)"),
     ],
 )
-def test_broken_files_are_one_line_and_exit_code_2(copied, damage, said, capsys):
+def test_broken_files_are_one_line_and_exit_code_2(copied, damage, said, reader, tmp_path, capsys):
     damage(copied)
-    assert main(["demos", "replay", str(copied.parent), "--jobs", "1"]) == 2
+    out = tmp_path / "out"
+    words = READERS[reader].format(data=copied.parent, out=out).split()
+    if reader == "play":
+        words.append(json.dumps({"data": str(copied.parent)}))
+    assert main(words) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and re.search(said, lines[0])
+    assert reader == "play" or not out.exists()
 
 
-def _without(path: Path, name: str) -> None:
+def _without(path: Path, name: str, kept: int = 0) -> None:
+    """Take a group or array out of a file, but for its first rows."""
     with h5py.File(path, "a") as file:
+        rows = file[name][:kept] if kept else None
         del file[name]
+        if rows is not None:
+            file[name] = rows
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import read_results
-from manipose_mj.evaluation.runner import evaluate
+from manipose_mj.evaluation.runner import BaselineRunner, evaluate, run_one
+from tests.few_objects import few
 
 TASK = "single_object/target_pose"
 MIDDLE = EstimatorSettings("tests.estimators.answers:Middle", '{"score": 0.5}', give_cad=True)
@@ -30,6 +32,7 @@ def test_results_say_whose_estimates_they_are_of(tmp_path):
     told = {"name": MIDDLE.name, "arguments": {"score": 0.5}, "given CAD": True}
     run, summary = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("run", "summary"))
     assert run["estimator"] == summary["estimator"] == told
+    assert run["masks"] == summary["masks"] == "oracle"
     assert summary["poses"]["objects"] == f"estimated by {MIDDLE.name}, given CAD"
     assert "--give-cad" in run["command"] and "--estimator-args" in run["command"]
     with pytest.raises(InputError, match="its results have estimator"):
@@ -57,6 +60,13 @@ def test_a_server_lost_in_the_middle_is_no_failed_episode_and_can_be_resumed(tmp
         return [{k: v for k, v in line.items() if k != "wall_s"} for line in lines]
 
     assert timeless(broken) == timeless(whole)
+
+
+def test_a_worker_that_finds_no_server_has_lost_it(tmp_path):
+    gone = replace(config(tmp_path, EstimatorSettings("ws://localhost:9")), objects=few(TASK))
+    runner = BaselineRunner(gone.planner, gone.estimator)
+    with pytest.raises(ServerLostError, match="no estimator server answers .*repeat with --resume"):
+        run_one(gone, runner, TASK, 0)
 
 
 def test_a_lost_server_is_exit_1_and_one_line(tmp_path, monkeypatch, capsys):

@@ -10,25 +10,30 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
 import pytest
+from websockets.sync.server import serve as websocket_server
 
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.evaluation.cards.method import method_of, method_text, sources_of
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.episode import environment_of, run_episode, run_policy_episode
-from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.policy_settings import Attachment, PolicySettings, attachment_of
 from manipose_mj.evaluation.protocol import load as load_protocol
 from manipose_mj.evaluation.records import read_results
-from manipose_mj.evaluation.results_folder import RUN_FILE
-from manipose_mj.evaluation.runner import evaluate
+from manipose_mj.evaluation.results_folder import RUN_FILE, SUMMARY_FILE
+from manipose_mj.evaluation.runner import PolicyRunner, evaluate, run_one
+from manipose_mj.policies.baseline import BaselinePolicy
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.wire.framing import pack
 from tests.few_objects import config, few
 from tests.places import ROOT
-from tests.policies.own_policies import Reaching
+from tests.policies.own_policies import Peeking, Reaching, answering_narrow
 from tests.policies.test_remote import served
 
 TASK = "single_object/target_pose"
@@ -86,11 +91,52 @@ def test_what_is_beyond_a_limit_is_clipped_and_counted():
     assert run(replace(REACHING, arguments='{"beyond": 1e-7}')).clipped_actions == 0
 
 
-def test_true_poses_are_named():
-    seeing = replace(REACHING, obs_mode="state+pose")
-    assert run(seeing, obs_mode="state+pose").pose_source == "oracle"
-    assert evaluation(Path(), seeing).poses == {"objects": "true", "furniture": "true"}
-    assert evaluation(Path(), REACHING).poses == {"objects": "none", "furniture": "none"}
+@pytest.mark.parametrize(
+    ("obs_mode", "pose", "masks"),
+    [
+        ("state+rgb+pointcloud/points", "none", "none"),
+        ("state+pose", "oracle", "none"),
+        ("state+pointcloud", "none", "oracle"),
+        ("pose+segmentation", "oracle", "oracle"),
+    ],
+)
+def test_observations_that_tell_the_truth_are_named(obs_mode, pose, masks):
+    asked = evaluation(Path(), replace(REACHING, obs_mode=obs_mode))
+    assert (asked.pose_source, asked.mask_source) == (pose, masks)
+    assert asked.identity["pose"] == pose
+    source = "true" if pose == "oracle" else "none"
+    assert asked.poses == {"objects": source, "furniture": source}
+
+
+@pytest.mark.parametrize(
+    ("name", "obs_mode", "pose", "masks"),
+    [
+        ("Reaching", "state", "none", "none"),
+        ("Reaching", "state+pose", "oracle", "none"),
+        ("Peeking", "state", "oracle", "oracle"),  # its episodes fail, and say so nevertheless
+    ],
+)
+def test_all_records_agree_on_what_a_policy_got(name, obs_mode, pose, masks, tmp_path):
+    settings = PolicySettings(f"{HERE}:{name}", obs_mode=obs_mode)
+    evaluate(evaluation(tmp_path, settings, episodes=1))
+    (line,) = timeless(tmp_path)
+    assert (line["pose_source"], line["mask_source"]) == (pose, masks)
+    source = "true" if pose == "oracle" else "none"
+    run, summary = (json.loads((tmp_path / file).read_text()) for file in (RUN_FILE, SUMMARY_FILE))
+    assert (run["pose"], run["masks"]) == (summary["pose"], summary["masks"]) == (pose, masks)
+    assert summary["poses"] == {"objects": source, "furniture": source}
+    assert sources_of(run) == (pose, masks)
+    assert ("it was given the simulator" in method_text(method_of(run))) == (name == "Peeking")
+
+
+def test_a_policy_with_the_simulator_is_believed_only_names_that_there_are():
+    told = attachment_of(BaselinePolicy("estimated"))
+    assert told == Attachment("estimated", "oracle")
+    assert attachment_of(BaselinePolicy()) == Attachment("oracle", "none")
+    claiming = Peeking()
+    claiming.pose_source, claiming.mask_source = "none", ["none"]
+    assert attachment_of(claiming) == Attachment("oracle", "oracle")
+    assert attachment_of(Reaching()) is None
 
 
 @pytest.mark.parametrize(("stop", "steps"), [("success", 25), ("horizon", 100)])
@@ -127,6 +173,7 @@ def test_the_baseline_is_a_policy_behind_the_same_door():
         "manipose_mj.policies.baseline:BaselinePolicy", hz=50.0, stop="horizon"
     )
     one, path = run_episode(env_config(), EpisodeSpec(1))
+    assert (one.pose_source, one.mask_source) == ("oracle", "none")
     two, again = run_policy_episode(env_config(), EpisodeSpec(1), settings=settings)
     assert replace(one, wall_s=0, policy_s=0) == replace(two, wall_s=0, policy_s=0)
     assert one.success_at_end and one.decisions == one.steps + 1
@@ -185,6 +232,40 @@ def test_a_server_lost_in_the_middle_can_be_resumed(tmp_path, capsys):
         evaluate(lost, resume=True)
     evaluate(evaluation(tmp_path / "whole", REACHING))
     assert timeless(out) == timeless(tmp_path / "whole")
+
+
+@contextmanager
+def greeting_once() -> Iterator[str]:
+    """The address of a server that goes away when it has told somebody its metadata."""
+
+    def converse(connection: Any) -> None:
+        connection.send(pack({"manipose_reset": True}))
+        Thread(target=server.shutdown).start()  # which waits for this function
+
+    server = websocket_server(converse, "localhost", 0, compression=None)
+    thread = Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    yield f"ws://localhost:{server.socket.getsockname()[1]}"
+    server.shutdown()
+    thread.join(5)
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.full)])
+def test_a_lost_server_is_exit_code_1_also_where_a_worker_never_met_it(jobs, tmp_path, capsys):
+    out = tmp_path / "out"
+    with greeting_once() as address:
+        words = ["evaluate", TASK, "--episodes", "2", "--jobs", str(jobs), "--out", str(out)]
+        assert main([*words, "--policy", address, "--objects", *few(TASK)]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "the policy server" in said or "no policy server answers" in said
+    assert "start it again and repeat with --resume" in said
+    assert (out / RUN_FILE).is_file() and not read_results(out / "results.jsonl")[0]
+
+
+def test_a_worker_that_finds_no_server_has_lost_it(tmp_path):
+    gone = replace(REACHING, name="ws://localhost:9")
+    with pytest.raises(ServerLostError, match="no policy server answers .*repeat with --resume"):
+        run_one(evaluation(tmp_path, gone), PolicyRunner(gone), TASK, 0)
 
 
 def test_resume_refuses_the_results_of_another_policy(tmp_path):
@@ -251,11 +332,17 @@ def test_bad_input_is_one_line_and_nothing_is_written(argv, said, tmp_path, caps
     assert not (tmp_path / "out").exists()
 
 
-def test_actions_of_another_control_mode_end_the_evaluation(tmp_path, capsys):
-    words = ["evaluate", TASK, "--jobs", "1", "--out", str(tmp_path / "out")]
-    words += ["--policy", f"{HERE}:answering_narrow", "--objects", *few(TASK)]
-    assert main(words) == 2
-    assert "have 7 numbers; pd_joint_pos takes 8" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("jobs", "remote"),
+    [(1, False), (1, True), pytest.param(2, False, marks=pytest.mark.full)],
+)
+def test_actions_of_another_control_mode_end_the_evaluation(jobs, remote, tmp_path, capsys):
+    words = ["evaluate", TASK, "--jobs", str(jobs), "--episodes", "2", "--objects", *few(TASK)]
+    with served(answering_narrow()) as server:
+        name = server.address if remote else f"{HERE}:answering_narrow"
+        assert main([*words, "--out", str(tmp_path / "out"), "--policy", name]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "have 7 numbers; pd_joint_pos takes 8" in said
 
 
 def test_a_step_that_nobody_observes_changes_only_the_observation():

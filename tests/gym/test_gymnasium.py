@@ -53,11 +53,11 @@ def test_the_checker_is_content_with_observation_modes(mode):
     _check(gymnasium.make(ID, obs_mode=mode, **options).unwrapped)
 
 
-def _check(checked: ManiPoseEnv) -> None:
+def _check(checked: ManiPoseEnv, *, skip: bool = True) -> None:
     assert isinstance(checked, ManiPoseEnv)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        check_env(checked, skip_render_check=True, skip_close_check=True)
+        check_env(checked, skip_render_check=skip, skip_close_check=skip)
     assert not [str(w.message) for w in caught]
     checked.close()
     checked.close()
@@ -65,18 +65,16 @@ def _check(checked: ManiPoseEnv) -> None:
 
 @pytest.mark.full
 def test_the_checker_draws_and_closes_too():
-    made = gymnasium.make(ID, render_mode="rgb_array", height=24, width=32)
+    size = {"render_mode": "rgb_array", "height": 24, "width": 32}
+    made = gymnasium.make(ID, objects=OBJECTS, normalise_actions=True, **size)
     made.unwrapped.metadata = {
         **ManiPoseEnv.metadata,
         "render_modes": ["rgb_array"],
     }  # no window here
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        check_env(made.unwrapped)
     made.reset(seed=0)
     picture = made.render()
     assert picture.shape == (24, 32, 3) and picture.dtype == np.uint8 and picture.std() > 5
-    made.close()
+    _check(made.unwrapped, skip=False)
 
 
 def test_ids_are_made_of_the_tasks_names():

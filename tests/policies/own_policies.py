@@ -53,6 +53,12 @@ class Raising:
         raise KeyError("weights")
 
 
+class Peeking(Raising):
+    """A policy that asks for the simulator, and fails."""
+
+    def attach(self, environment: Any) -> None: ...
+
+
 class GivingUp(Raising):
     """A policy that says so."""
 

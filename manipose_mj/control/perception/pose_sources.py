@@ -16,7 +16,11 @@ from manipose_mj.control.perception.perturbed import (
 )
 from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.perception.sensed_world import SensedWorld
-from manipose_mj.control.perception.source_names import GraspSource, default_grasps
+from manipose_mj.control.perception.source_names import (
+    POSE_SOURCES,
+    GraspSource,
+    default_grasps,
+)
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.errors import unknown_name
 from manipose_mj.estimators.loading import load_estimator
@@ -24,9 +28,6 @@ from manipose_mj.estimators.observation import asset_mesh
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
-
-# Everything true; everything estimated; objects estimated and all else true.
-POSE_SOURCES = ("oracle", "estimated", "estimated_objects")
 
 
 def check_pose_source(pose: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from statistics import fmean
@@ -13,6 +13,7 @@ from typing import Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.cards.markdown import OWN_CODE, card_markdown
+from manipose_mj.evaluation.cards.method import method_of
 from manipose_mj.evaluation.cards.run_record import RunRecord, read_run
 from manipose_mj.evaluation.records import write_atomically
 from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
@@ -141,7 +142,7 @@ def _card(about: About, where: Sequence[str], records: Sequence[RunRecord]) -> d
     runs = [_entry(place, record) for place, record in zip(where, records, strict=True)]
     if not runs:
         raise InputError("a card is of at least one run")
-    methods = [_method(record.run) for record in records]
+    methods = [method_of(record.run) for record in records]
     if any(method != methods[0] for method in methods):
         raise InputError("the runs are of different methods; a card is of one")
     hashes = [record.sha256 for record in records]
@@ -175,14 +176,6 @@ def _entry(place: str, record: RunRecord) -> dict[str, Any]:
         **rates,
         "tasks": tasks,
     }
-
-
-def _method(run: Mapping[str, Any]) -> dict[str, Any]:
-    """Who acted, and what was told truly."""
-    method = {name: run.get(name) for name in ("policy", "policy metadata", "pose", "estimator")}
-    # What a run leaves at its default, older runs do not know.
-    chosen = {name: run[name] for name in ("injected errors", "grasps") if run.get(name)}
-    return {**method, **chosen}
 
 
 def _inside(place: Any) -> str:

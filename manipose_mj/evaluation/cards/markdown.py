@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from manipose_mj.evaluation import protocol
-from manipose_mj.evaluation.policy_settings import tells_true_poses
+from manipose_mj.evaluation.cards.method import method_text
 
 OWN_CODE = "this repository"
 
@@ -26,33 +26,9 @@ def card_markdown(card: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def method_text(method: Mapping[str, Any]) -> str:
-    """Who acted, what was told truly and what was made wrong on purpose, in a line."""
-    wrong = method.get("injected errors") or {}
-    made = [f"{name.replace('_', ' ')} {value}" for name, value in wrong.items()]
-    grasps = f", grasps by {method['grasps']}" if method.get("grasps") else ""
-    return _who(method) + grasps + (f"; errors made on purpose: {', '.join(made)}" if made else "")
-
-
 def _coverage(run: Mapping[str, Any]) -> str:
     """How many of the protocol's tasks a run is of, such as `1 of 34`."""
     return f"{len(run['tasks'])} of {len(protocol.load(run['protocol']).tasks)}"
-
-
-def _who(method: Mapping[str, Any]) -> str:
-    policy = method.get("policy")
-    if policy:
-        name = policy.get("name", "?") if isinstance(policy, Mapping) else policy
-        seen = policy.get("obs_mode") if isinstance(policy, Mapping) else None
-        told = ", true poses among them" if seen and tells_true_poses(seen) else ""
-        return f"policy `{name}`" + (f", observations `{seen}`{told}" if seen else "")
-    if method.get("pose") != "estimated":
-        return "the baseline planner with true poses"
-    estimator = method.get("estimator")
-    if not estimator:
-        return "the baseline planner with poses estimated by the package's weights"
-    given = ", which was given the objects' meshes" if estimator.get("given CAD") else ""
-    return f"the baseline planner with poses estimated by `{estimator['name']}`{given}"
 
 
 def _run_lines(run: Mapping[str, Any]) -> list[str]:

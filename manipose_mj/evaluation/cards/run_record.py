@@ -11,6 +11,7 @@ from typing import Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.cards.method import NEEDED, sources_of
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import EpisodeResult, read_results
 from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
@@ -35,8 +36,9 @@ def read_run(folder: Path) -> RunRecord:
     """The evaluation in a folder, complete and on the seeds that its protocol fixes.
 
     Raises:
-      InputError: A file is missing or broken, the run follows no protocol of this version, or an episode is
-        missing, superfluous, of another seed or about another object; one line says which.
+      InputError: A file is missing or broken, the run follows no protocol of this version or does not tell its
+        method, or an episode is missing, superfluous, of another seed, about another object or told other things
+        than the run; one line says which.
     """
     run = _run_file(folder / RUN_FILE)
     path = folder / RESULTS_FILE
@@ -47,6 +49,7 @@ def read_run(folder: Path) -> RunRecord:
     if size < len(content):
         raise InputError(f"{path}: line {len(results) + 1} is not an episode's whole result")
     _check_episodes(path, _config(folder, run), results)
+    _check_told(folder, run, results)
     ordered = tuple(sorted(results, key=lambda result: result.key))
     return RunRecord(run, ordered, hashlib.sha256(content).hexdigest())
 
@@ -68,7 +71,30 @@ def _run_file(path: Path) -> dict[str, Any]:
             f"{path}: protocol {frozen.version} has sha256 {frozen.sha256[:12]}..., "
             f"the run is of {str(run.get('protocol sha256'))[:12]}..."
         )
+    missing = [name for name in NEEDED if name not in run]
+    if missing:
+        raise InputError(
+            f"{path}: lacks {missing[0]!r}, so that it does not tell its method; evaluate again"
+        )
     return run
+
+
+def _check_told(folder: Path, run: dict[str, Any], results: Sequence[EpisodeResult]) -> None:
+    """Episodes and run agree on where poses and instance masks came from."""
+    try:
+        pose, masks = sources_of(run)
+    except InputError as error:
+        raise InputError(f"{folder / RUN_FILE}: policy: {error}") from None
+    for result in results:
+        for name, found, expected in (
+            ("pose_source", result.pose_source, pose),
+            ("mask_source", result.mask_source, masks),
+        ):
+            if found not in (expected, None):
+                raise InputError(
+                    f"{folder / RESULTS_FILE}: episode {result.episode} of {result.task} has {name} "
+                    f"{found!r}; {RUN_FILE} tells of {expected!r}: evaluate again"
+                )
 
 
 def _config(folder: Path, run: dict[str, Any]) -> EvaluationConfig:

@@ -12,7 +12,7 @@ import tests.evaluation.fake_episodes as fake
 from manipose_mj.cli.main import main
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.cards.card import check_card
-from manipose_mj.evaluation.cards.markdown import method_text
+from manipose_mj.evaluation.cards.method import NEEDED, method_of, method_text
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import from_line, to_line
 from manipose_mj.evaluation.runner import evaluate
@@ -239,24 +239,146 @@ def test_runs_of_different_methods_make_no_card(results, tmp_path, capsys):
     assert "different methods" in capsys.readouterr().err
 
 
+MASKS = "from true instance masks"
+RULES = {"kind": "rules"}
+ATTACHED = {"pose_source": "oracle", "mask_source": "oracle"}
+
+
 @pytest.mark.parametrize(
-    ("method", "text"),
+    ("run", "pose", "masks", "text"),
     [
-        ({"pose": "oracle"}, "the baseline planner with true poses"),
-        ({"pose": "estimated"}, "by the package's weights"),
+        ({}, "oracle", "none", "the baseline planner with true poses"),
+        (
+            {"pose": "estimated"},
+            "estimated",
+            "oracle",
+            f"the baseline planner with poses estimated by the package's weights {MASKS}",
+        ),
         (
             {"pose": "estimated", "estimator": {"name": "a:B", "given CAD": True}},
-            "estimated by `a:B`, which was given the objects' meshes",
+            "estimated",
+            "oracle",
+            f"poses estimated by `a:B` {MASKS} and the objects' meshes",
         ),
         (
-            {"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+rgb"}},
-            "policy `a:B`, observations `state+rgb`",
+            {"pose": "estimated_objects", "estimator": {"name": "a:B", "arguments": {"k": 1}}},
+            "estimated_objects",
+            "oracle",
+            "with true poses of furniture, and poses of objects estimated by `a:B` with arguments "
+            f'`{{"k": 1}}` {MASKS}',
         ),
         (
-            {"pose": "oracle", "policy": {"name": "a:B", "obs_mode": "state+pose"}},
-            "policy `a:B`, observations `state+pose`, true poses among them",
+            {"planner": {"kind": "llm", "model": "m-1", "instruction": "Go\nthere."}},
+            "oracle",
+            "none",
+            "the baseline with plans of the language model `m-1`, told `Go there.`, with true poses",
+        ),
+        (
+            {"planner": {"kind": "replay", "replay sha256": "ab" * 32}},
+            "oracle",
+            "none",
+            "the baseline with recorded plans `abababababababab` of a language model with true poses",
+        ),
+        (
+            {"assets sha256": "cd" * 32},
+            "oracle",
+            "none",
+            "with true poses; builds of own assets `cdcdcdcdcdcdcdcd`",
+        ),
+        (
+            {"policy": {"obs_mode": "state+rgb", "arguments": '{"a": 1}'}},
+            "none",
+            "none",
+            'policy `a:B` with arguments `{"a": 1}`, observations `state+rgb`',
+        ),
+        (
+            {"policy": {"obs_mode": "state+pose"}, "batch": {"engine": "warp", "worlds": 8}},
+            "oracle",
+            "none",
+            "observations `state+pose`, true poses among them; batched worlds of engine `warp`",
+        ),
+        (
+            {"policy": {"obs_mode": "state+pointcloud"}},
+            "none",
+            "oracle",
+            "observations `state+pointcloud`, true instance masks among them",
+        ),
+        (
+            {"policy": {"obs_mode": "pose+segmentation"}},
+            "oracle",
+            "oracle",
+            "`pose+segmentation`, true poses and true instance masks among them",
+        ),
+        (
+            {"policy": {"obs_mode": "state", "attachment": ATTACHED}},
+            "oracle",
+            "oracle",
+            "observations `state`; it was given the simulator, from which it says to take true poses "
+            "and true instance masks",
+        ),
+        (
+            {
+                "policy": {
+                    "obs_mode": "state",
+                    "attachment": {**ATTACHED, "pose_source": "estimated"},
+                }
+            },
+            "estimated",
+            "oracle",
+            "from which it says to take true instance masks and poses `estimated`",
         ),
     ],
 )
-def test_a_method_is_described_with_what_it_was_told(method, text):
+def test_a_method_is_described_with_what_it_was_told(run, pose, masks, text):
+    whole = {**dict.fromkeys(NEEDED), "pose": "oracle", "planner": RULES, **run}
+    if whole["policy"]:
+        whole["policy"] = {"name": "a:B", **whole["policy"]}
+    method = method_of(whole)
+    assert (method["pose"], method["masks"]) == (pose, masks)
     assert method_text(method).endswith(text)
+
+
+def edit_run(card: Path, **changes) -> None:
+    path = card / "runs" / "0" / "run.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        (
+            {"planner": {"kind": "llm", "model": "m"}},
+            "planner: kind: 'rules'; the results say 'llm'",
+        ),
+        ({"batch": {"engine": "warp", "worlds": 2}}, "engine: None"),
+        ({"assets sha256": "ab"}, "assets sha256: None"),
+    ],
+)
+def test_methods_that_differ_in_more_than_poses_are_two(
+    card, results, tmp_path, capsys, changes, name
+):
+    other = tmp_path / "other"
+    shutil.copytree(results, other)
+    run = json.loads((other / "run.json").read_text())
+    (other / "run.json").write_text(json.dumps(run | changes))
+    assert main(["card", str(results), str(other), *WORDS, "--out", str(tmp_path / "two")]) == 2
+    assert "different methods" in capsys.readouterr().err
+    edit_run(card, **changes)
+    assert f"method: {name}" in refusal(card, capsys)
+
+
+def test_a_run_that_does_not_tell_its_method_is_refused(card, capsys):
+    path = card / "runs" / "0" / "run.json"
+    run = json.loads(path.read_text())
+    del run["planner"]
+    path.write_text(json.dumps(run))
+    assert "lacks 'planner', so that it does not tell its method" in refusal(card, capsys)
+
+
+def test_a_run_that_tells_of_less_than_its_episodes_got_is_refused(card, capsys):
+    edit_run(card, policy={"name": "a:B", "obs_mode": "state"})
+    assert "has pose_source 'oracle'; run.json tells of 'none'" in refusal(card, capsys)
+    edit_run(card, policy={"name": "a:B", "obs_mode": "state+pose"})
+    assert "method: policy: None; the results say" in refusal(card, capsys)
+    edit_run(card, policy={"nome": "a:B"})
+    assert "run.json: policy: no settings of a policy" in refusal(card, capsys)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from manipose_mj.evaluation.cards.card import check_card
+from manipose_mj.evaluation.cards.method import method_text
 from tests.places import ROOT
 
 CARDS = sorted(path.parent for path in (ROOT / "leaderboard").glob("*/card.json"))
@@ -45,6 +46,7 @@ def test_the_page_shows_every_card(hook):
         name, url = content["name"], content["code_url"]
         linked = f"[{name}]({url})" if url.startswith("https://") else name
         assert f"| {linked} |" in shown and f"\n## {content['name']}\n" in shown
+        assert f" | {method_text(content['method'])} | " in shown
         for run in content["runs"]:
             assert f" | {len(run['tasks'])} of 34 | " in shown
             assert f"results sha256 `{run['results_sha256'][:16]}`" in shown

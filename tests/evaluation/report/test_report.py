@@ -88,6 +88,7 @@ def test_page_stands_alone_and_nests(page: str) -> None:
 
 
 def test_page_says_what_was_run(page: str, evaluation: Path) -> None:
+    assert "instance masks from <b>none</b>" in page
     text = re.sub(r"<wbr>|</?span[^>]*>", "", page)
     for task in fake.TASKS:
         assert task in text
