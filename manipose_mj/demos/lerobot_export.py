@@ -84,9 +84,10 @@ def lerobot_writer(config: ExportConfig, features: dict[str, Any]) -> Writer:
             LeRobotDataset,
         )
     except ImportError as error:
+        reason = " ".join(str(error).split())
         raise InputError(
-            f"the export needs LeRobot ({error}); pip install 'lerobot[dataset]' beside this package, "
-            "with Python 3.12"
+            f"the export needs LeRobot ({reason}); install the extra: pip install 'manipose-mj[lerobot]', "
+            "with Python 3.12 and in an environment of its own"
         ) from None
     return LeRobotDataset.create(
         repo_id=config.repo_id,
