@@ -157,10 +157,11 @@ def _replayed(
 ) -> tuple[list[Mapping[str, Any]], bool]:
     environment = environment_of(env_config)
     step = environment.reset(EpisodeSpec(seed))
-    policy = SteppedPolicy(actions)
+    seen: list[Mapping[str, Any]] = []
+    policy = SteppedPolicy(actions, seen.append)
     features = Features(environment)
     Rollout(environment, policy, Rules(float(config.hz)), observe=features.read).run(step)
-    return policy.seen, environment.task.succeeded(environment.physics)
+    return seen, environment.task.succeeded(environment.physics)
 
 
 def lerobot_features(features: Features) -> dict[str, Any]:
