@@ -140,7 +140,7 @@ def _by_ompl(start: np.ndarray, goal: np.ndarray, collides: Callable[[np.ndarray
     path = problem.getSolutionPath()
     simplifier = geometric.PathSimplifier(information)
     simplifier.reduceVertices(path)
-    simplifier.ropeShortcutPath(path) if hasattr(simplifier, "ropeShortcutPath") else None
+    simplifier.ropeShortcutPath(path)
     points = np.array([[state[i] for i in range(7)] for state in path.getStates()])
     return points, counted.calls, time.perf_counter() - begin
 

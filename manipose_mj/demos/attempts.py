@@ -105,7 +105,6 @@ def attempt(config: EnvConfig, seed: int, number: int, folder: Path, *, failures
             np.array(tape.qvel),
             np.array(tape.success, bool),
             truncated=result.failure == "timeout",
-            obs={},
         )
         with writing(attempt_file(folder, number).with_suffix(".h5")) as file:
             write_episode(file, number, arrays)

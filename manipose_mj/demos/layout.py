@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -29,7 +29,7 @@ from manipose_mj.gym.registration import env_id
 BACKEND = "mujoco_cpu"
 RECORDED_MODE = "pd_joint_pos"
 RECORDED_HZ = 50
-_COMPRESSED: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+COMPRESSION: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ class DemoArrays:
       qvel: `(t + 1, nv)`, likewise.
       success: `(t,)`, whether the goal was met after each step.
       truncated: Whether the time limit ended it.
-      obs: `(t + 1, ...)` by name; empty where none were added.
     """
 
     actions: Float[np.ndarray, "t n"]
@@ -79,7 +78,6 @@ class DemoArrays:
     qvel: Float[np.ndarray, "s nv"]
     success: np.ndarray
     truncated: bool
-    obs: Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -172,8 +170,8 @@ def writing(path: Path) -> Iterator[h5py.File]:
 
 
 def write_episode(file: h5py.File, number: int, arrays: DemoArrays) -> None:
-    """Add the group of an episode."""
-    group = file.create_group(f"traj_{number}")
+    """Add what was done and came of it to the group of an episode, which may hold its observations."""
+    group = file.require_group(f"traj_{number}")
     steps = len(arrays.actions)
     ended = np.zeros(steps, bool)
     ended[-1:] = arrays.truncated
@@ -184,10 +182,9 @@ def write_episode(file: h5py.File, number: int, arrays: DemoArrays) -> None:
         "success": arrays.success,
         "env_states/qpos": arrays.qpos,
         "env_states/qvel": arrays.qvel,
-        **{f"obs/{name}": values for name, values in arrays.obs.items()},
     }
     for name, values in columns.items():
-        group.create_dataset(name, data=values, **(_COMPRESSED if np.size(values) else {}))
+        group.create_dataset(name, data=values, **(COMPRESSION if np.size(values) else {}))
 
 
 def write_description(demos: DemoSet) -> None:

@@ -84,9 +84,10 @@ def lerobot_writer(config: ExportConfig, features: dict[str, Any]) -> Writer:
             LeRobotDataset,
         )
     except ImportError as error:
+        reason = " ".join(str(error).split())
         raise InputError(
-            f"the export needs LeRobot ({error}); pip install 'lerobot[dataset]' beside this package, "
-            "with Python 3.12"
+            f"the export needs LeRobot ({reason}); install the extra: pip install 'manipose-mj[lerobot]', "
+            "with Python 3.12 and in an environment of its own"
         ) from None
     return LeRobotDataset.create(
         repo_id=config.repo_id,
@@ -159,10 +160,11 @@ def _replayed(
 ) -> tuple[list[Mapping[str, Any]], bool]:
     environment = environment_of(env_config)
     step = environment.reset(EpisodeSpec(seed))
-    policy = SteppedPolicy(actions)
+    seen: list[Mapping[str, Any]] = []
+    policy = SteppedPolicy(actions, seen.append)
     features = Features(environment)
     Rollout(environment, policy, Rules(float(config.hz)), observe=features.read).run(step)
-    return policy.seen, environment.task.succeeded(environment.physics)
+    return seen, environment.task.succeeded(environment.physics)
 
 
 def lerobot_features(features: Features) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,8 @@ from manipose_mj.errors import InputError
 from manipose_mj.storage.staging import staging
 
 if TYPE_CHECKING:
+    import h5py
+
     from manipose_mj.tasks.core.config import EnvConfig
 
 
@@ -199,14 +202,19 @@ def replay_one(
     if config.control_mode != episode.control_mode:
         recording = Recording(episode.control_mode, episode.episode_seed, actions, episode.success)
         actions = convert(environment, recording, config.control_mode).actions
-    arrays, success, digest = run_actions(
-        environment, episode.episode_seed, actions, observed=bool(config.obs_mode)
-    )
+    part = None if parts is None else parts / f"traj_{episode.episode_id}.h5"
+    with nullcontext() if part is None else writing(part) as file:
+        group = None
+        if file is not None and config.obs_mode:
+            group = file.create_group(f"traj_{episode.episode_id}/obs")
+        arrays, success, digest = run_actions(environment, episode.episode_seed, actions, group)
+        if file is not None:
+            write_episode(file, episode.episode_id, arrays)
     identical = digest == episode.state_sha256
-    if parts is None or not success:
+    if part is None or not success:
+        if part is not None:
+            part.unlink()
         return Replayed(episode, success, identical)
-    with writing(parts / f"traj_{episode.episode_id}.h5") as file:
-        write_episode(file, episode.episode_id, arrays)
     now = replace(
         episode,
         control_mode=config.control_mode,
@@ -219,7 +227,7 @@ def replay_one(
 
 
 def run_actions(
-    environment: Any, seed: int, actions: Float[np.ndarray, "t n"], *, observed: bool
+    environment: Any, seed: int, actions: Float[np.ndarray, "t n"], group: h5py.Group | None = None
 ) -> tuple[DemoArrays, bool, str]:
     """Carry out actions, one a control step.
 
@@ -227,12 +235,13 @@ def run_actions(
       environment: Of the task.
       seed: Of the episode.
       actions: Of the environment's control mode.
-      observed: Whether to keep features of all steps.
+      group: Where to write the features of all steps; None: nowhere.
 
     Returns:
       What happened, whether the goal is met at the end, and the sha256 of all states.
     """
     from manipose_mj.demos.attempts import StateTape
+    from manipose_mj.demos.observation_tape import ObservationTape
     from manipose_mj.evaluation.rollout import Rollout, Rules
     from manipose_mj.gym.features import Features
     from manipose_mj.tasks.core.config import EpisodeSpec
@@ -240,18 +249,18 @@ def run_actions(
     step = environment.reset(EpisodeSpec(seed))
     tape, features = StateTape(environment), Features(environment)
     tape.record(0)
-    policy = SteppedPolicy(actions)
+    observations = None if group is None else ObservationTape(group)
+    policy = SteppedPolicy(actions, observations.append if observations else _unseen)
     rollout = Rollout(
         environment,
         policy,
         Rules(RECORDED_HZ),
-        observe=features.read if observed else lambda observation: {},
+        observe=features.read if observations else lambda observation: {},
         after_step=tape.record,
     )
     outcome = rollout.run(step)
-    # A policy that has nothing left is asked once more: of the end, too, there is an observation.
-    seen = [_arrays(each) for each in policy.seen]
-    obs = {name: np.stack([each[name] for each in seen]) for name in (seen[0] if seen else {})}
+    if observations:
+        observations.flush()
     timeout = outcome.failure is not None and outcome.failure.stage == "timeout"
     arrays = DemoArrays(
         actions[: outcome.steps],
@@ -259,37 +268,38 @@ def run_actions(
         np.array(tape.qvel),
         np.array(tape.success, bool),
         timeout,
-        obs,
     )
     return arrays, bool(environment.task.succeeded(environment.physics)), tape.digest
 
 
+def _unseen(observation: Mapping[str, Any]) -> None: ...
+
+
 class SteppedPolicy:
-    """Answers with one action after the other, and keeps what it was shown.
+    """Answers with one action after the other, and passes on what it is shown."""
 
-    Attributes:
-      seen: Observations, one for each action and one for the end.
-    """
+    def __init__(
+        self,
+        actions: Float[np.ndarray, "t n"],
+        show: Callable[[Mapping[str, Any]], None] = _unseen,
+    ) -> None:
+        """Keeps the actions.
 
-    def __init__(self, actions: Float[np.ndarray, "t n"]) -> None:
-        self._actions, self._asked = actions, 0
-        self.seen: list[Mapping[str, Any]] = []
+        Args:
+          actions: `(t, n)`.
+          show: Called with every observation: one for each action and, as it is asked once more, one of the end.
+        """
+        self._actions, self._asked, self._show = actions, 0, show
 
     def reset(self, **episode: Any) -> None:
         """Nothing to do: an episode has a policy of its own."""
 
     def infer(self, obs: Mapping[str, Any]) -> dict[str, Any]:
         """The next action; done after the last."""
-        if obs:
-            self.seen.append(obs)
+        self._show(obs)
         chosen = self._actions[self._asked : self._asked + 1]
         self._asked += 1
         return {"actions": chosen, "done": len(chosen) == 0}
-
-
-def _arrays(observation: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """The features that are arrays; the instruction is in the description."""
-    return {name: each for name, each in observation.items() if isinstance(each, np.ndarray)}
 
 
 def lost(results: Sequence[Replayed]) -> int:

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Stock LeRobot with this plug-in: record, export, open, train ACT for a moment, evaluate. Needs Python 3.12, LeRobot with
-# its extras dataset, training and evaluation, this package and the plug-in, all in the environment of BIN.
+# Stock LeRobot with this plug-in: record, export, open, train ACT for a moment, evaluate; then its rate of success in frozen
+# episodes beside ours. Needs Python 3.12, LeRobot with its extras dataset, training and evaluation, this package and the
+# plug-in, all in the environment of BIN.
 # Usage: conformance.sh BIN OUT [EPISODES] [OBJECT...]
 set -eu
 bin=$1 out=$2 episodes=${3:-50}
@@ -21,3 +22,5 @@ print('data set:', d.num_episodes, 'episodes,', len(d), 'frames at', d.fps, 'Hz'
     --output_dir="$out/act"
 "$bin/lerobot-eval" --policy.path="$out/act/checkpoints/last/pretrained_model" --policy.device=cpu --env.type=manipose \
     --env.task=$task --env.protocol=v1 --eval.n_episodes=10 --eval.batch_size=2 --output_dir="$out/eval"
+rm -rf "$out/parity"
+"$bin/python" "$(dirname "$0")/rollout_parity.py" --out "$out/parity"

@@ -66,6 +66,7 @@ def random_pose(rng, near=None) -> np.ndarray:
     return compose(near[:3, :3] @ turn, near[:3, 3] + rng.normal(0, 0.02, 3))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("kind", list(INFOS))
 def test_mssd_and_mspd_equal_the_published_formulas(kind):
     """250 poses for each of four kinds of symmetry: far ones, and near ones."""

@@ -51,13 +51,13 @@ class Conformance(EnvironmentTestMixin, absltest.TestCase):
         self.environment.close()  # twice
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("task", suite.ALL_TASKS, ids="/".join)
 def test_tasks_conform(task):
     Conformance(load(*task, seed=0, environment_kwargs=SHORT)).check()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mode", [*CONTROL_MODES, "primitive"])
 def test_control_modes_conform(mode):
     environment = load(*TASK, seed=0, obs_mode="state", control_mode=mode, environment_kwargs=SHORT)

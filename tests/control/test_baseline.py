@@ -87,6 +87,7 @@ def test_the_record_follows_the_episode():
     np.testing.assert_allclose(positions[0], data.qpos, atol=1e-6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["chips_can_000", "box_000"])
 def test_a_held_object_does_not_slip(name):
     environment = load(

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+import tomllib
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -20,35 +18,16 @@ import pytest
 
 from manipose_mj.cli.main import main
 from manipose_mj.demos import record as recording
-from manipose_mj.demos.layout import find_sets, frozen_seeds, read_actions, read_set, refuse_frozen
+from manipose_mj.demos.layout import frozen_seeds, read_actions, read_set, refuse_frozen
 from manipose_mj.demos.lerobot_export import ExportConfig, export
 from manipose_mj.demos.playback import slowed
-from manipose_mj.demos.record import RecordConfig, record
-from manipose_mj.demos.replay import ReplayConfig, differing_versions, lost, replay
+from manipose_mj.demos.record import record
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
+from tests.demos.recordings import OBJECTS, TASK, config
 from tests.places import ROOT
-
-TASK = "single_object/target_pose"
-OBJECTS = ("mug_000", "chips_can_000", "box_000")
-
-
-def config(out: Path, **options: Any) -> RecordConfig:
-    return RecordConfig(TASK, out, **{"episodes": 2, "objects": OBJECTS, **options})
-
-
-@pytest.fixture(scope="module")
-def demos(tmp_path_factory):
-    return record(config(tmp_path_factory.mktemp("demos")))
-
-
-@pytest.fixture
-def copied(demos, tmp_path):
-    """The recordings in a folder that a test may damage."""
-    shutil.copytree(demos.path.parent, tmp_path / "copied")
-    return tmp_path / "copied" / demos.path.name
 
 
 def test_recordings_have_maniskills_layout(demos):
@@ -68,34 +47,6 @@ def test_recordings_have_maniskills_layout(demos):
             assert group["success"][-1] and not group["terminated"][:].any()
     assert demos.path.stat().st_size < 2 * 150e3
     assert not (demos.path.parent / recording.PARTS).exists()
-
-
-def test_replays_are_bit_identical(demos):
-    results = replay(demos, ReplayConfig())
-    assert [each.identical for each in results] == [True, True] and lost(results) == 0
-    assert differing_versions(demos) == []
-    older = replace(demos, versions={**demos.versions, "numpy": "1.0"})
-    assert differing_versions(older)[0].startswith("numpy 1.0 -> ")
-
-
-@pytest.mark.full
-def test_a_replay_adds_observations_and_converts(demos, tmp_path):
-    asked = ReplayConfig("state+pose", "pd_ee_delta_pose", tmp_path)
-    results = replay(demos, asked)
-    (new,) = find_sets(tmp_path)
-    assert new.path.name == "trajectory.state+pose.pd_ee_delta_pose.mujoco_cpu.h5"
-    assert len(new.episodes) + lost(results) == 2 and new.episodes
-    episode = new.episodes[0]
-    with h5py.File(new.path) as file:
-        group = file[f"traj_{episode.episode_id}"]
-        assert group["actions"].shape == (episode.elapsed_steps, 7)
-        for name, width in (("agent_pos", 17), ("environment_state", 20)):
-            assert group[f"obs/{name}"].shape == (episode.elapsed_steps + 1, width)
-        assert (np.diff(group["obs/agent_pos"][:, 8:11], axis=0) != 0).any()
-    with pytest.raises(InputError, match="is there already"):
-        replay(demos, asked)
-    with pytest.raises(InputError, match="is a replay already"):
-        replay(new, replace(asked, out=tmp_path / "again"))
 
 
 @pytest.mark.sample(1)
@@ -162,10 +113,15 @@ def test_an_export_replays_at_its_rate_and_writes_frames(demos, tmp_path):
     ]  # fmt: skip
 
 
-def test_an_export_without_lerobot_says_so(demos, tmp_path, monkeypatch):
+def test_an_export_without_lerobot_names_the_extra(demos, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "lerobot", None)
-    with pytest.raises(InputError, match="needs LeRobot"):
-        export([demos], ExportConfig(tmp_path / "set"))
+    words = ["export", str(demos.path), "--format", "lerobot", "--out", str(tmp_path / "set")]
+    assert main(["demos", *words]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and "needs LeRobot" in lines[0]
+    assert "pip install 'manipose-mj[lerobot]'" in lines[0]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert extras["optional-dependencies"]["lerobot"][0].startswith("lerobot[dataset]>=0.6.1")
     assert not (tmp_path / "set").exists()
 
 
@@ -181,7 +137,7 @@ def recording_arrays(actions):
     from manipose_mj.demos.layout import DemoArrays
 
     states = np.zeros((len(actions) + 1, 3), np.float32)
-    return DemoArrays(actions, states, states, np.ones(len(actions), bool), False, {})
+    return DemoArrays(actions, states, states, np.ones(len(actions), bool), False)
 
 
 def write_attempt(config, number, seed, stage, arrays):

@@ -128,3 +128,18 @@ def test_its_success_is_that_of_our_evaluation(environment_class):
             ended, step = terminated or truncated, step + 1
         theirs.append(info["is_success"])
     assert ours == theirs and any(ours)
+
+
+def test_frozen_targets_are_played_one_by_one_and_the_last_is_held(tmp_path):
+    file = ROOT / "plugins/lerobot_env_manipose/frozen_targets.py"
+    spec = importlib.util.spec_from_file_location("frozen_targets", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    targets = {7: np.arange(16, dtype=np.float32).reshape(2, 8), 3: np.ones((1, 8), np.float32)}
+    module.write_targets(tmp_path / "new" / "targets.npz", targets)
+    policy = module.FrozenTargets(str(tmp_path / "new" / "targets.npz"))
+    for seed in (7, 3, 7):
+        policy.reset(seed=seed, task=TASK, instruction="", action_space=None)
+        played = [policy.infer({})["actions"] for _ in range(3)]
+        expected = [targets[seed][min(step, len(targets[seed]) - 1)][None] for step in range(3)]
+        np.testing.assert_array_equal(played, expected)

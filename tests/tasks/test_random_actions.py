@@ -20,8 +20,9 @@ def test_random_actions_neither_break_the_physics_nor_push_objects_through(blind
     assert blind.task.max_penetration < 0.005
 
 
-def test_slow_random_motions_touch_without_sinking_in(blind):
+@pytest.mark.parametrize("steps", [80, pytest.param(300, marks=pytest.mark.full)])
+def test_slow_random_motions_touch_without_sinking_in(blind, steps):
     reset(blind, 1)
-    for action in wander(blind, 300, 4):
+    for action in wander(blind, steps, 4):
         blind.step(action)
     assert blind.task.max_penetration < 0.005

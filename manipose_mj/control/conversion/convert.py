@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dm_control import composer, mjcf
+from dm_control import mjcf
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +21,7 @@ from manipose_mj.actions.tcp_motion import TcpPositionDelta, TcpTargetPositionDe
 from manipose_mj.control.conversion.recording import Recording, acting, task_of
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, rotation_angle
+from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.task import ManipulationTask
 
 # One step of the recording is this many parts; a step of the translation makes one to all of them.
@@ -47,7 +48,7 @@ class _Trace:
     in_hand: list[tuple[str, Float[np.ndarray, "4 4"]] | None]
 
 
-def convert(environment: composer.Environment, recording: Recording, mode: str) -> Recording:
+def convert(environment: TaskEnvironment, recording: Recording, mode: str) -> Recording:
     """The same episode with the actions of another control mode.
 
     The joints go where they went. A mode that moves the TCP takes it where it went, with whatever
@@ -80,7 +81,7 @@ def convert(environment: composer.Environment, recording: Recording, mode: str) 
                     break
             done += parts
             taken.append(action)
-            if environment.step(action).last():
+            if environment.step(action, observe=False).last():
                 break
         return Recording(mode, recording.seed, np.array(taken), task.success_now)
 
@@ -115,14 +116,14 @@ class _Correction:
         return np.append(joints, target[7])
 
 
-def _traced(environment: composer.Environment, recording: Recording) -> _Trace:
+def _traced(environment: TaskEnvironment, recording: Recording) -> _Trace:
     with acting(environment, recording.mode, recording.seed):
         task, physics = task_of(environment), environment.physics
         servos = [*task.robot.actuators, task.robot.gripper_actuator]
         targets = [np.append(*task.robot.configuration(physics))]
         in_hand = [_in_hand(task, physics)]
         for action in recording.actions:
-            environment.step(action)
+            environment.step(action, observe=False)
             targets.append(np.array(physics.bind(servos).ctrl))
             in_hand.append(_in_hand(task, physics))
     return _Trace(np.array(targets), in_hand)

@@ -45,6 +45,7 @@ def test_cavity_stays_hollow_where_bodies_overlap():
     assert 1.6 - volume < solid.volume < 1.6
 
 
+@pytest.mark.full
 def test_overlapping_bodies_decompose_in_seconds(tmp_path):
     body = trimesh.creation.cylinder(0.045, 0.11, sections=64)
     handle = trimesh.creation.torus(0.03, 0.006)

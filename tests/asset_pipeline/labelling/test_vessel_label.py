@@ -35,6 +35,7 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.rad2deg(np.arccos(np.clip(a @ b, -1, 1))))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("told", ["axial", "mirror"])
 @pytest.mark.parametrize("reach", [0.008, 0.03])
 def test_y_is_at_the_handle_whatever_type_was_told(told, reach):

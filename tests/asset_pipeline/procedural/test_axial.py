@@ -74,7 +74,7 @@ def test_turns_about_x_and_only_those_map_the_shape_onto_itself(category, index)
     assert trimesh.proximity.closest_point(checks.seen(specimen), turned)[1].max() < 0.4 * MM
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("category", MASSES)
 def test_labeller_measures_the_symmetry(category):
     checks.check_symmetry(made(category, 0))

@@ -47,13 +47,13 @@ def test_collision_agrees_with_what_is_seen(category, index):
     checks.check_agreement(made(category, index), 2.0 * MM)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @few
 def test_symmetry_is_that_of_the_shape(category, index):
     checks.check_symmetry(made(category, index))
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @few
 def test_xy_is_a_mirror_plane(category, index):
     """All but a belt clip, which is less than a millimetre thick, has its counterpart across it."""

@@ -118,6 +118,7 @@ def test_the_modes_of_an_environment_stay_its_own(cans, reach):
     assert cans.task.control_mode is usual
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mode", ["pd_ee_delta_pos", "pd_ee_target_delta_pos"])
 def test_turns_are_refused_where_they_cannot_be_said(boxes, placed, mode):
     with pytest.raises(InputError, match=f"turns the hand by .* deg, which {mode} cannot"):

@@ -61,6 +61,7 @@ def perceived(cup, estimator, **options) -> EstimatedPerception:
     )
 
 
+@pytest.mark.full
 def test_its_pose_is_the_scenes_and_a_known_object_stands_in_for_the_shape(cup, truth):
     estimator = Recalled(truth)
     perception = perceived(cup, estimator)

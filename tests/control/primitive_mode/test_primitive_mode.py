@@ -90,7 +90,7 @@ def test_a_grasp_and_a_release_are_a_success_and_repeat_bit_for_bit(primitives):
     np.testing.assert_array_equal(*ends)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.full
 def test_an_episode_goes_on_from_a_saved_state_bit_for_bit(primitives):
     environment = primitives.environment
     assert _take(primitives).observation[STATUS] == Status.DONE

@@ -161,6 +161,7 @@ def test_the_nearest_equivalent_is_what_the_pose_error_measures():
             assert rotation_angle(np.asarray(nearest, float), sampled).min() < 5e-3
 
 
+@pytest.mark.full
 def test_padding_changes_no_vote_and_no_nearest_label():
     rng = np.random.default_rng(0)
     along = jnp.asarray(rng.normal(size=(50, 3)), jnp.float32)
