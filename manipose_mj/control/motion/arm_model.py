@@ -22,7 +22,10 @@ class ArmModel:
 
     Attributes:
       model: nq = nv = 7; free bodies of the scene are left out, articulated ones are rigid.
+      tracks: Joint targets of lines that were asked for, None where the arm cannot follow, by what they depend on.
     """
+
+    tracks: dict[bytes, Float[np.ndarray, "k 7"] | None]
 
     def __init__(self, root: mjcf.RootElement, prefix: str = "panda") -> None:
         """Compiles the scene of `root` without its other joints."""
@@ -53,6 +56,7 @@ class ArmModel:
             if not geom.contype and not geom.conaffinity:
                 spec.delete(geom)
         self.model = spec.compile()
+        self.tracks = {}
         forbid_sleep(self.model)
         self.tcp = f"{prefix}/tcp"
         self._robot_body = self.model.body(f"{prefix}/").id

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import mink
@@ -12,6 +13,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.batch_ik import rotation_vector
 from manipose_mj.mjcf.panda.kinematics import VELOCITY_LIMITS
+
+_KEPT = 2_000  # lines that an arm remembers; a target is a kilobyte or two
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def track(
     """Joint targets that lead the TCP through `poses`; None if the arm cannot follow.
 
     Each step is a quadratic program: the frame task under joint position, joint velocity and
-    collision-avoidance limits.
+    collision-avoidance limits. Plans that fail ask for the same lines again: the arm keeps what it answered.
 
     Args:
       arm: The arm among its obstacles.
@@ -77,6 +80,36 @@ def track(
       config: Speeds, tolerances, clearances.
     """
     config = config or LineConfig()
+    key = _digest(arm, joints, poses, repr((timestep, sorted(touched_bodies), config)))
+    if key not in arm.tracks:
+        if len(arm.tracks) == _KEPT:
+            arm.tracks.clear()
+        arm.tracks[key] = _tracked(arm, joints, poses, timestep, touched_bodies, config)
+    targets = arm.tracks[key]
+    return None if targets is None else targets.copy()
+
+
+def _digest(
+    arm: ArmModel,
+    joints: Float[np.ndarray, "7"],
+    poses: Float[np.ndarray, "t 4 4"],
+    options: str,
+) -> bytes:
+    """Of all that a tracked line depends on; `ArmModel.follow` changes nothing of the model but places and turns."""
+    found = hashlib.blake2b(options.encode(), digest_size=16)
+    for values in (arm.model.body_pos, arm.model.body_quat, joints, poses):
+        found.update(np.ascontiguousarray(values))
+    return found.digest()
+
+
+def _tracked(
+    arm: ArmModel,
+    joints: Float[np.ndarray, "7"],
+    poses: Float[np.ndarray, "t 4 4"],
+    timestep: float,
+    touched_bodies: frozenset[str],
+    config: LineConfig,
+) -> Float[np.ndarray, "k 7"] | None:
     configuration = mink.Configuration(arm.model, q=joints)
     frame = mink.FrameTask(arm.tcp, "site", position_cost=1.0, orientation_cost=0.5)
     damping = mink.DampingTask(arm.model, cost=1e-4)
