@@ -57,7 +57,10 @@ def truth(cup):
 def perceived(cup, estimator, **options) -> EstimatedPerception:
     service = EstimatorService("mine", estimator)
     return EstimatedPerception(
-        cup.task, cup.physics, estimators=lambda c: ForeignEstimator(service, c), **options
+        cup.task,
+        cup.physics,
+        estimators=lambda kind: ForeignEstimator(service, kind.category),
+        **options,
     )
 
 
