@@ -13,6 +13,7 @@ import numpy as np
 from manipose_mj.assets.categories import Split
 from manipose_mj.control.perception.source_names import (
     GRASP_SOURCES,
+    TOLD_OF_KINDS,
     GraspSource,
     default_grasps,
 )
@@ -195,8 +196,10 @@ class EvaluationConfig:
         objects = "true" if self.pose == "oracle" else "estimated"
         if self.estimator is not None:
             objects = self.estimator.source
+        told = {} if self.pose == "oracle" else {"kinds": TOLD_OF_KINDS}
         return {
             "objects": objects + wrong,
+            **told,
             "furniture": "estimated" if self.pose == "estimated" else "true",
         }
 

@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.object_kinds import ObjectKind, object_kind
 from manipose_mj.control.perception.object_views import ObjectView, ObjectViews, seen_points
@@ -28,7 +29,7 @@ from manipose_mj.control.perception.pose_sensing import (
     sense_pose,
 )
 from manipose_mj.control.perception.shapes.shape_fits import OneShape, ShapeFitter, shapes_of
-from manipose_mj.control.perception.source_names import GraspSource
+from manipose_mj.control.perception.source_names import TOLD_OF_KINDS, GraspSource
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
@@ -110,6 +111,7 @@ class EstimatedPerception:
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
+        self._own_estimators = estimators is None
         self._meshes = meshes
         self._world = world or SimulatedWorld(task, physics)
         self.feels_joints = self._world.feels_joints
@@ -125,8 +127,10 @@ class EstimatedPerception:
         self._held_width = 0.0  # of the gripper then [m]
         self._time = -1.0
         self._keys = _keys(0)
+        self._flat_keys = _keys(0)  # its own, for what is round not to depend on it
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
+            "kinds": TOLD_OF_KINDS,
             "furniture": self._world.source,
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
@@ -138,7 +142,7 @@ class EstimatedPerception:
           StageFailure: An object that a goal is about is not seen.
           InputError: There are no weights for a category or its type.
         """
-        self._keys = _keys(seed)
+        self._keys, self._flat_keys = _keys(seed), _keys(seed)
         self._held, self._known, self._grasps = None, {}, {}
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
@@ -183,7 +187,11 @@ class EstimatedPerception:
         for name, kind in self._kinds().items():
             if name in self._known:
                 continue
-            sensed = self._sensed(name, self._views.of(self._physics, name), shapes_of(kind))
+            views = self._views.of(self._physics, name)
+            sensed = self._sensed(name, views, shapes_of(kind))
+            if sensed is not None and self._own_estimators:
+                seen = views or self._more_views.of(self._physics, name)
+                sensed = sensed_if_flat(kind, sensed, seen, self._flat_keys)
             if sensed is not None:
                 self._known[name] = sensed
 

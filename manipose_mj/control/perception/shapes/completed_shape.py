@@ -12,13 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from jaxtyping import Bool, Float
+from scipy.ndimage import minimum_filter
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from manipose_mj.assets.asset import StablePose
 from manipose_mj.assets.geometry import MassProperties, Shape
 from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView
+from manipose_mj.control.perception.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
 from manipose_mj.control.perception.shapes.symmetric_completion import symmetry_turns
 from manipose_mj.grasp_sampling.touch_points import union_points
 from manipose_mj.poses import SymmetryGroup, invert, transform
@@ -37,6 +39,7 @@ _DENSITY = 500.0  # kg/m^3; nobody weighs what is seen
 _SURFACE_POINTS = 1500
 _IN_FRONT = 0.006  # of what a camera measured, as far as depth is not known better [m]
 _FAR = 0.02  # [m]
+_ABOUT = 5  # pixels
 _RESTS = 6  # stable poses, the likeliest
 
 
@@ -44,32 +47,36 @@ def completed_shape(
     category: str,
     object_type: ObjectType,
     pose: Float[np.ndarray, "4 4"],
-    points: Float[np.ndarray, "n 3"],
+    views: Sequence[ObjectView],
 ) -> KnownShape:
-    """What is seen, completed, as a shape in the label's frame.
+    """What is seen, completed, as a shape in the label's frame, with the symmetry that it shows.
 
     Args:
       category: For its name.
       object_type: Whose symmetry completes it.
       pose: `T_world_label` by a hypothesis.
-      points: Seen, at least `_FEWEST`, world frame [m].
+      views: Of at least `_FEWEST` points together.
     """
+    points = seen_points(views)
     points = points[in_company(points)]
-    group = SymmetryGroup(np.eye(3)[None], axial=object_type == "axial")
     hulls = convex_parts(_completed(object_type, pose, _filled_beneath(points)))
     corners = np.concatenate(hulls)
     low, high = corners.min(axis=0), corners.max(axis=0)
     extents, center = np.maximum(high - low, 1e-3), (low + high) / 2
-    label = PoseLabel(np.zeros(3), np.eye(3), object_type, extents, group, center=center)
     meshes = [trimesh.convex.convex_hull(hull) for hull in hulls]
     outside = union_points([Shape("mesh", mesh=mesh) for mesh in meshes], np.random.default_rng(0))
     surface = outside.thinned(_SURFACE_POINTS, np.random.default_rng(0)).points
+    seen = transform(invert(pose), points)
+    group = estimated_symmetry(
+        object_type, seen, surface, center, lambda moved: in_front(transform(pose, moved), views)
+    )
+    label = PoseLabel(np.zeros(3), np.eye(3), object_type, extents, group, center=center)
     mass = _mass(meshes)
     return KnownShape(
         name=f"seen_{category}",
         label=label,
         hulls=tuple(hulls),
-        surface=np.concatenate([surface, transform(invert(pose), points)]),
+        surface=np.concatenate([surface, seen]),
         rests=_rests(corners, mass.center_of_mass),
         mass=mass,
     )
@@ -91,19 +98,30 @@ def looked_through(
       points: Seen, world frame [m].
       views: That they are from.
     """
-    points = transform(pose, _completed(object_type, pose, points))
+    return in_front(transform(pose, _completed(object_type, pose, points)), views)
+
+
+def in_front(points: Float[np.ndarray, "n 3"], views: Sequence[ObjectView]) -> float:
+    """How far points of the world frame are in front of what the cameras measured, the mean over them [m]."""
     farthest = np.zeros(len(points))
     for view in views:
         local = transform(invert(view.T_world_camera), points)
         image = local @ view.image.intrinsics.matrix.T
         pixel = np.round(image[:, :2] / np.maximum(image[:, 2:], 1e-6)).astype(int)
-        height, width = view.image.depth.shape
+        nearest = _nearest_about(view.image.depth)
+        height, width = nearest.shape
         inside = ((pixel >= 0) & (pixel < [width, height])).all(axis=1) & (local[:, 2] > 0)
         depth = np.zeros(len(points))
-        depth[inside] = view.image.depth[pixel[inside, 1], pixel[inside, 0]]
+        depth[inside] = nearest[pixel[inside, 1], pixel[inside, 0]]
         off = np.where(depth > 0, depth - local[:, 2] - _IN_FRONT, 0.0)
         farthest = np.maximum(farthest, np.clip(off, 0.0, _FAR))
     return float(farthest.mean())
+
+
+def _nearest_about(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """The least depth around each pixel: edges are not known to the pixel; 0 where nothing was measured."""
+    least = minimum_filter(np.where(depth > 0, depth, np.inf), size=_ABOUT)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def convex_parts(points: Float[np.ndarray, "n 3"]) -> list[Float[np.ndarray, "_ 3"]]:

@@ -118,7 +118,7 @@ class CompletedShapes:
         contradiction = looked_through(self.object_type, pose, points[in_company(points)], views)
         return ShapeFit(
             _NOISE + contradiction,
-            lambda: completed_shape(self.category, self.object_type, pose, points),
+            lambda: completed_shape(self.category, self.object_type, pose, views),
         )
 
 
