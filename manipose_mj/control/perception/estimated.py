@@ -111,7 +111,6 @@ class EstimatedPerception:
         """
         self._task, self._physics = task, physics
         self._load = estimators or _load
-        self._own_estimators = estimators is None
         self._meshes = meshes
         self._world = world or SimulatedWorld(task, physics)
         self.feels_joints = self._world.feels_joints
@@ -127,7 +126,6 @@ class EstimatedPerception:
         self._held_width = 0.0  # of the gripper then [m]
         self._time = -1.0
         self._keys = _keys(0)
-        self._flat_keys = _keys(0)  # its own, for what is round not to depend on it
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
             "kinds": TOLD_OF_KINDS,
@@ -142,7 +140,7 @@ class EstimatedPerception:
           StageFailure: An object that a goal is about is not seen.
           InputError: There are no weights for a category or its type.
         """
-        self._keys, self._flat_keys = _keys(seed), _keys(seed)
+        self._keys = _keys(seed)
         self._held, self._known, self._grasps = None, {}, {}
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
@@ -189,9 +187,9 @@ class EstimatedPerception:
                 continue
             views = self._views.of(self._physics, name)
             sensed = self._sensed(name, views, shapes_of(kind))
-            if sensed is not None and self._own_estimators:
+            if sensed is not None:
                 seen = views or self._more_views.of(self._physics, name)
-                sensed = sensed_if_flat(kind, sensed, seen, self._flat_keys)
+                sensed = sensed_if_flat(kind, sensed, seen)
             if sensed is not None:
                 self._known[name] = sensed
 

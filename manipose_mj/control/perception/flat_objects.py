@@ -1,14 +1,13 @@
 """Objects of a category that is round in the catalogue, but which are not: a flat bottle, an oval can.
 
-The category's network finds their axis and nothing about it. Where no round shape fits what is seen, two networks
-together look once more, and a flattened shape that fits better is taken instead.
+The category's network finds their axis and nothing about it. Where no round shape fits what is seen, the smallest
+rectangle around the points, as they are seen along the axis, says where their sides are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,75 +15,77 @@ from jaxtyping import Float
 from manipose_mj.control.perception.known_shapes import KnownShape, best_fit, known_shapes
 from manipose_mj.control.perception.object_kinds import ObjectKind
 from manipose_mj.control.perception.object_views import ObjectView, seen_points
-from manipose_mj.control.perception.pose_sensing import SensedPose, sense_pose
+from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.control.perception.shapes.completed_shape import in_front
 from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
-from manipose_mj.control.perception.shapes.shape_fits import ShapeFit
-from manipose_mj.poses import SymmetryGroup, invert, transform
+from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
-if TYPE_CHECKING:
-    from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
-
-# Round test objects have misfits of 2.0 to 4.0 mm (a bin 6.0), and flattened shapes fit them 0.95 to 2.5 times as badly;
-# flat bottles and cans have 5.9 to 8.0 mm, and 0.54 to 0.89 times of it when flattened.
-_ROUND = 0.0045  # misfit up to which what is seen is round [m]
-_BETTER = 0.92  # of that misfit, for something flat to be believed
+# Of round test objects only bins fit worse, and their rectangles are nearly squares.
+_ROUND = 0.005  # misfit up to which what is seen is round [m]
+_FLAT = 0.85  # of its length, a rectangle's width from which on it is none
+_AS_WELL = 1.05  # times the misfit of the round shape, up to which something flat is believed
+_ANGLES = 45  # of a quarter turn
+_EDGES = (1.0, 99.0)  # percentiles between which the points lie: a few are noise
+_X = np.array([1.0, 0.0, 0.0])
 _HALF_TURN = SymmetryGroup(np.stack([np.eye(3), np.diag([1.0, -1.0, -1.0])]))
 
 
-@dataclass(frozen=True)
-class FlatShapes:
-    """The training object of a round category that fits best, stretched to three different lengths."""
-
-    shapes: Sequence[KnownShape]
-
-    def fit(
-        self,
-        hypothesis: PoseEstimate,
-        pose: Float[np.ndarray, "4 4"],
-        views: Sequence[ObjectView],
-    ) -> ShapeFit:
-        """As `ShapeFitter.fit`."""
-        local = transform(invert(pose), seen_points(views))
-        extents = np.maximum(hypothesis.extents.astype(float), 1e-3)
-        shape, misfit = best_fit(self.shapes, extents, local)
-
-        def alike_turned() -> KnownShape:
-            group = estimated_symmetry(
-                "mirror",
-                local,
-                shape.surface,
-                shape.label.center,
-                lambda moved: in_front(transform(pose, moved), views),
-            )
-            turned = any(np.allclose(turn, _HALF_TURN.rotations[1]) for turn in group.rotations)
-            symmetry = _HALF_TURN if turned else SymmetryGroup.identity()
-            return replace(shape, label=replace(shape.label, symmetry=symmetry))
-
-        return ShapeFit(misfit, alike_turned)
-
-
-def sensed_if_flat(
-    kind: ObjectKind, sensed: SensedPose, views: Sequence[ObjectView], keys: Callable[[], Any]
-) -> SensedPose:
-    """`sensed`, or the pose of something flat where that fits what is seen much better.
+def sensed_if_flat(kind: ObjectKind, sensed: SensedPose, views: Sequence[ObjectView]) -> SensedPose:
+    """`sensed`, or the pose and shape of something flat where that fits what is seen as well.
 
     Args:
       kind: Of the object; only round ones of the catalogue are looked at again.
       sensed: By the category's network, as something round.
       views: That it was sensed in.
-      keys: A new random key at every call.
     """
     if not (kind.in_catalogue and kind.object_type == "axial") or sensed.misfit <= _ROUND:
         return sensed
-    from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion  # loads JAX
-
-    fusion = TwoNetworkFusion.load(kind.category)
-    shapes = [_flat(shape) for shape in known_shapes(kind.category)]
-    flat = sense_pose(fusion, views, FlatShapes(shapes), keys)
-    if flat is None or flat.misfit > _BETTER * sensed.misfit:
+    points = seen_points(views)
+    about, lengths = _rectangle(transform(invert(sensed.pose), points)[:, 1:])
+    if lengths[1] > _FLAT * lengths[0]:
         return sensed
-    return flat
+    pose = sensed.pose @ about
+    local = transform(invert(pose), points)
+    extents = np.maximum(np.append(sensed.shape.extents[0], lengths), 1e-3)
+    flat = [_flat(shape) for shape in known_shapes(kind.category)]
+    shape, misfit = best_fit(flat, extents, local)
+    if misfit > _AS_WELL * sensed.misfit:
+        return sensed
+    return replace(sensed, pose=pose, shape=_symmetric(shape, local, pose, views), misfit=misfit)
+
+
+def _rectangle(
+    across: Float[np.ndarray, "n 2"],
+) -> tuple[Float[np.ndarray, "4 4"], Float[np.ndarray, "2"]]:
+    """The smallest rectangle about points of the YZ plane: `T_axis_label` [m], and its lengths, the longer along Y."""
+    found = []
+    for angle in np.linspace(0, np.pi / 2, _ANGLES, endpoint=False):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        low, high = np.percentile(across @ turn.T, _EDGES, axis=0)
+        found.append((float(np.prod(high - low)), angle, turn.T @ (low + high) / 2, high - low))
+    _, angle, middle, lengths = min(found, key=lambda each: each[0])
+    if lengths[0] < lengths[1]:
+        angle, lengths = angle + np.pi / 2, lengths[::-1]
+    return compose(rotation_about(_X, angle), np.append(0.0, middle)), lengths
+
+
+def _symmetric(
+    shape: KnownShape,
+    points: Float[np.ndarray, "n 3"],
+    pose: Float[np.ndarray, "4 4"],
+    views: Sequence[ObjectView],
+) -> KnownShape:
+    """The shape with a half turn about X as its symmetry, if the points show none against it."""
+    group = estimated_symmetry(
+        "mirror",
+        points,
+        shape.surface,
+        shape.label.center,
+        lambda moved: in_front(transform(pose, moved), views),
+    )
+    turned = any(np.allclose(turn, _HALF_TURN.rotations[1]) for turn in group.rotations)
+    symmetry = _HALF_TURN if turned else SymmetryGroup.identity()
+    return replace(shape, label=replace(shape.label, symmetry=symmetry))
 
 
 def _flat(shape: KnownShape) -> KnownShape:
