@@ -319,7 +319,7 @@ class EstimatedPerception:
         return tuple(replace(view, mesh=mesh) for view in views)
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
-        body = self._world.body(name)
+        body, kind = self._world.body(name), self._kinds()[name]
         return ObjectEstimate(
             name=name,
             pose=sensed.pose,
@@ -328,8 +328,10 @@ class EstimatedPerception:
             body=body,
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
-            category=self._kinds()[name].category,
+            category=kind.category,
             uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
+            guessed_frame=not kind.in_catalogue
+            or kind.object_type != sensed.shape.label.object_type,
         )
 
 

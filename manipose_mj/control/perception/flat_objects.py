@@ -16,7 +16,7 @@ from manipose_mj.control.perception.known_shapes import KnownShape, best_fit, kn
 from manipose_mj.control.perception.object_kinds import ObjectKind
 from manipose_mj.control.perception.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.pose_sensing import SensedPose
-from manipose_mj.control.perception.shapes.completed_shape import in_front
+from manipose_mj.control.perception.shapes.completed_shape import in_front, stable_rests
 from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
@@ -85,7 +85,9 @@ def _symmetric(
     )
     turned = any(np.allclose(turn, _HALF_TURN.rotations[1]) for turn in group.rotations)
     symmetry = _HALF_TURN if turned else SymmetryGroup.identity()
-    return replace(shape, label=replace(shape.label, symmetry=symmetry))
+    corners = np.concatenate(shape.hulls)
+    rests = stable_rests(corners, shape.mass.center_of_mass)
+    return replace(shape, label=replace(shape.label, symmetry=symmetry), rests=rests)
 
 
 def _flat(shape: KnownShape) -> KnownShape:

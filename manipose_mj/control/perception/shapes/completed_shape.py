@@ -77,7 +77,7 @@ def completed_shape(
         label=label,
         hulls=tuple(hulls),
         surface=np.concatenate([surface, seen]),
-        rests=_rests(corners, mass.center_of_mass),
+        rests=stable_rests(corners, mass.center_of_mass),
         mass=mass,
     )
 
@@ -218,7 +218,7 @@ def _mass(meshes: Sequence[trimesh.Trimesh]) -> MassProperties:
     return MassProperties(mass, center, mass * spread**2 / 12 * np.eye(3))
 
 
-def _rests(
+def stable_rests(
     corners: Float[np.ndarray, "c 3"], center: Float[np.ndarray, "3"]
 ) -> tuple[StablePose, ...]:
     """The likeliest poses in which the hull lies still."""
