@@ -20,15 +20,15 @@ from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
-from manipose_mj.control.perception.object_kinds import ObjectKind, object_kind
-from manipose_mj.control.perception.object_views import ObjectView, ObjectViews, seen_points
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
+from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
+from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.pose_sensing import (
     MIN_VIEW_POINTS,
     Estimator,
     SensedPose,
     sense_pose,
 )
-from manipose_mj.control.perception.shapes.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.source_names import TOLD_OF_KINDS, GraspSource
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.control.scene.collision_model import subtree_geoms

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.perception.known_shapes import KnownShape, best_fit, known_shapes
-from manipose_mj.control.perception.object_kinds import ObjectKind
-from manipose_mj.control.perception.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.objects.completed_shape import in_front, stable_rests
+from manipose_mj.control.perception.objects.estimated_symmetry import estimated_symmetry
+from manipose_mj.control.perception.objects.known_shapes import KnownShape, best_fit, known_shapes
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.pose_sensing import SensedPose
-from manipose_mj.control.perception.shapes.completed_shape import in_front, stable_rests
-from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
 # Of round test objects only bins fit worse, and their rectangles are nearly squares.

@@ -10,8 +10,8 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.assets.gripper import ParallelJaw
 from manipose_mj.control.perception.cloud_grasps import cloud_grasps
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.observed_surface import observed_surface
 from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.control.perception.source_names import GraspSource

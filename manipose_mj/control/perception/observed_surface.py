@@ -12,8 +12,8 @@ from trimesh.convex import convex_hull
 
 from manipose_mj.assets.geometry import Shape
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.shapes.symmetric_completion import symmetry_turns
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.symmetric_completion import symmetry_turns
 from manipose_mj.grasp_sampling.grasp_fit import ObjectCloud
 from manipose_mj.grasp_sampling.touch_points import SurfacePoints, first_in_cells, union_points
 

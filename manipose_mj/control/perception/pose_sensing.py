@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView, seen_points
-from manipose_mj.control.perception.shapes.shape_fits import ShapeFitter
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.objects.shape_fits import ShapeFitter
 from manipose_mj.poses import invert, rotation_angle, transform
 
 if TYPE_CHECKING:

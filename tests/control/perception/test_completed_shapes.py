@@ -11,14 +11,14 @@ from scipy.spatial import ConvexHull, cKDTree
 from manipose_mj import suite
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
 from manipose_mj.control.perception.estimated import EstimatedPerception
-from manipose_mj.control.perception.object_kinds import object_kind
-from manipose_mj.control.perception.pose_sources import sensors_for
-from manipose_mj.control.perception.shapes.completed_shape import (
+from manipose_mj.control.perception.objects.completed_shape import (
     completed_shape,
     convex_parts,
     looked_through,
 )
-from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
+from manipose_mj.control.perception.objects.estimated_symmetry import estimated_symmetry
+from manipose_mj.control.perception.objects.object_kinds import object_kind
+from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.poses import compose, invert, pose_error, transform
 from manipose_mj.tasks.core.config import EnvConfig
 

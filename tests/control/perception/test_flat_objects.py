@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
-from manipose_mj.control.perception.known_shapes import known_shapes
-from manipose_mj.control.perception.object_kinds import ObjectKind
-from manipose_mj.control.perception.object_views import ObjectView, ViewImage
+from manipose_mj.control.perception.objects.known_shapes import known_shapes
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind
+from manipose_mj.control.perception.objects.object_views import ObjectView, ViewImage
 from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 from manipose_mj.poses import compose, pose_error, rotation_about

@@ -18,10 +18,10 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from manipose_mj.assets.asset import StablePose
 from manipose_mj.assets.geometry import MassProperties, Shape
 from manipose_mj.assets.label import ObjectType, PoseLabel
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView, seen_points
-from manipose_mj.control.perception.shapes.estimated_symmetry import estimated_symmetry
-from manipose_mj.control.perception.shapes.symmetric_completion import symmetry_turns
+from manipose_mj.control.perception.objects.estimated_symmetry import estimated_symmetry
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.objects.symmetric_completion import symmetry_turns
 from manipose_mj.grasp_sampling.touch_points import union_points
 from manipose_mj.poses import SymmetryGroup, invert, transform
 

@@ -10,19 +10,19 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.label import ObjectType
-from manipose_mj.control.perception.known_shapes import (
+from manipose_mj.control.perception.objects.completed_shape import (
+    completed_shape,
+    in_company,
+    looked_through,
+)
+from manipose_mj.control.perception.objects.known_shapes import (
     KnownShape,
     best_fit,
     known_shapes,
     nearest_shape,
 )
-from manipose_mj.control.perception.object_kinds import ObjectKind
-from manipose_mj.control.perception.object_views import ObjectView, seen_points
-from manipose_mj.control.perception.shapes.completed_shape import (
-    completed_shape,
-    in_company,
-    looked_through,
-)
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.poses import invert, transform
 
 if TYPE_CHECKING:
