@@ -1,10 +1,11 @@
-"""Every handled drawer and door of some furniture, opened and shut by the baseline with true poses, part by part.
+"""Every handled drawer and door of some furniture, opened and shut by the baseline, part by part.
 
     python benchmarks/furniture_table.py [--assets DIR] [--only NAME ...] [--skip NAME ...] [--seeds 0 1]
-        [--parts NAME ...] [--verbs open close] [--jobs 2]
+        [--parts NAME ...] [--verbs open close] [--pose estimated] [--jobs 2]
 
 Without a folder: the catalogue's test cabinets, microwaves and ovens. One line a part and verb: how many of the
-seeds succeeded, and why the others did not. A part without a handle is left out.
+seeds succeeded, and why the others did not. A part without a handle is left out. With `--pose estimated` handles,
+joints and openings come from what the cameras see, not from the simulator.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from manipose_mj.assets.asset import Asset, MovingPart  # noqa: E402
 from manipose_mj.assets.asset_json import read_asset  # noqa: E402
 from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
 from manipose_mj.control.grasping.candidates import MIN_CLEARANCE  # noqa: E402
+from manipose_mj.control.perception.pose_sources import POSE_SOURCES, sensors_for  # noqa: E402
 from manipose_mj.evaluation.episode import run_episode  # noqa: E402
+from manipose_mj.evaluation.statistics import wilson_interval  # noqa: E402
 from manipose_mj.mjcf.panda.robot import MAX_OPENING  # noqa: E402
 from manipose_mj.tasks.articulated.object_draw import RequestedFurniture, furniture_alone  # noqa: E402
 from manipose_mj.tasks.articulated.open_close import OpenClose, OpenCloseConfig  # noqa: E402
@@ -48,6 +51,7 @@ class Case:
     part: str
     verb: str
     seeds: tuple[int, ...]
+    pose: str
 
     def load(self) -> Asset:
         """The asset."""
@@ -76,11 +80,12 @@ def main() -> None:
     parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")
     parser.add_argument("--parts", nargs="+", default=[], help="names of parts")
     parser.add_argument("--verbs", nargs="+", default=["open", "close"])
+    parser.add_argument("--pose", choices=POSE_SOURCES, default="oracle")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
     cases = [
-        Case(folder, asset.name, part.name, verb, tuple(options.seeds))
+        Case(folder, asset.name, part.name, verb, tuple(options.seeds), options.pose)
         for folder, asset in _assets(options.assets)
         if (not options.only or asset.name in options.only) and asset.name not in options.skip
         for part in asset.parts
@@ -96,7 +101,10 @@ def main() -> None:
         reasons = [r for row in rows if row.case.verb == verb for r in row.reasons]
         fits = [r for row in rows if row.case.verb == verb and _fits(row) for r in row.reasons]
         done, able = reasons.count(""), fits.count("")
-        print(f"{verb}: {done} of {len(reasons)}; of handles that fit: {able} of {len(fits)}")
+        print(
+            f"{verb}, {options.pose}: {done} of {len(reasons)}{_interval(done, len(reasons))}; "
+            f"of handles that fit: {able} of {len(fits)}"
+        )
 
 
 def run(case: Case) -> Row:
@@ -105,12 +113,15 @@ def run(case: Case) -> Row:
     asset = case.load()
     part = asset.part(case.part)
     config = EnvConfig(
-        f"furniture/{case.verb}_{kind_of(part)}", obs_mode="state", objects=(str(asset.folder),)
+        f"furniture/{case.verb}_{kind_of(part)}",
+        obs_mode="state",
+        objects=(str(asset.folder),),
+        sensors=sensors_for(case.pose),
     )
     reasons = []
     for seed in case.seeds:
         spec = EpisodeSpec(seed, furniture=asset.name, part=part.name)
-        result, _ = run_episode(config, spec)
+        result, _ = run_episode(config, spec, pose=case.pose)
         done = result.success_at_end
         reasons.append("" if done else f"{result.failure}: {result.reason}")
     seconds = time.perf_counter() - started
@@ -155,6 +166,13 @@ def _width(part: MovingPart) -> float:
 
 def _fits(row: Row) -> bool:
     return row.width <= MAX_OPENING - MIN_CLEARANCE
+
+
+def _interval(done: int, count: int) -> str:
+    if not count:
+        return ""
+    low, high = wilson_interval(done, count)
+    return f" (95 % interval {low:.0%} to {high:.0%})"
 
 
 def _line(row: Row) -> str:

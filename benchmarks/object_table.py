@@ -1,12 +1,13 @@
-"""Rigid objects through tasks of the baseline with true poses, object by object.
+"""Rigid objects through tasks of the baseline, with true or with estimated poses, object by object.
 
     manipose assets build ycb PATH --out SCANS/ycb
     python benchmarks/object_table.py --assets SCANS/ycb [SCANS/gso ...] [--tasks single_object/target_pose ...]
-        [--only NAME ...] [--skip NAME ...] [--seeds 0 1] [--json FILE]
+        [--pose estimated] [--only NAME ...] [--skip NAME ...] [--seeds 0 1] [--json FILE]
 
 Without a folder: one test object of each rigid category of the catalogue, `--each` another one (0: the first).
 One line an episode; then of each task how many succeeded of those that it takes, and why it takes the others not.
-Objects of whose grasps too few survived the trials of the build are in brackets; they do not count.
+Objects of whose grasps too few survived the trials of the build are in brackets; they do not count. With estimated
+poses a failure names its stage: `perception` where the pose that was acted on was beyond the tolerance of success.
 """
 
 from __future__ import annotations
@@ -23,10 +24,13 @@ from manipose_mj.console.process import one_thread_per_process
 
 one_thread_per_process()
 
+import numpy as np  # noqa: E402
+
 from manipose_mj.assets import catalogue  # noqa: E402
 from manipose_mj.assets.asset import Asset  # noqa: E402
 from manipose_mj.assets.asset_json import list_assets, read_asset  # noqa: E402
 from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
+from manipose_mj.control.perception.pose_sources import POSE_SOURCES, sensors_for  # noqa: E402
 from manipose_mj.errors import InputError  # noqa: E402
 from manipose_mj.evaluation.episode import run_episode  # noqa: E402
 from manipose_mj.evaluation.statistics import wilson_interval  # noqa: E402
@@ -42,7 +46,8 @@ class Row:
     """One episode, or a refusal.
 
     Attributes: task; object; graspable: by the build's trials; seed, None where the task does not take the object;
-      succeeded; reason: why not; seconds.
+      succeeded; reason: why not; seconds; category; pose: where poses came from; error_cm, error_deg: of the estimate
+      that was acted on, None with true poses or where nothing was grasped.
     """
 
     task: str
@@ -52,6 +57,10 @@ class Row:
     succeeded: bool
     reason: str
     seconds: float
+    category: str = ""
+    pose: str = "oracle"
+    error_cm: float | None = None
+    error_deg: float | None = None
 
 
 def main() -> None:
@@ -61,6 +70,7 @@ def main() -> None:
         "--assets", nargs="+", type=Path, default=[], help="folders of asset folders"
     )
     parser.add_argument("--each", type=int, default=0, help="which test object of a category")
+    parser.add_argument("--pose", choices=POSE_SOURCES, default="oracle")
     parser.add_argument("--tasks", nargs="+", default=list(TASKS))
     parser.add_argument("--only", nargs="+", default=[], help="names of assets")
     parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")
@@ -76,7 +86,7 @@ def main() -> None:
     rows: list[Row] = []
     for task in options.tasks:
         for asset in assets:
-            for row in played(task, asset, options.seeds):
+            for row in played(task, asset, options.seeds, options.pose):
                 rows.append(row)
                 print(line_of(row), flush=True)
     for task in options.tasks:
@@ -85,19 +95,29 @@ def main() -> None:
         options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
 
 
-def played(task: str, asset: Asset, seeds: Sequence[int]) -> list[Row]:
+def played(task: str, asset: Asset, seeds: Sequence[int], pose: str) -> list[Row]:
     """An episode of each seed; one row with the reason where the task does not take the object."""
-    config = EnvConfig(task, obs_mode="state", split=_SPLIT, objects=(str(asset.folder),))
-    named, rows = (task, asset.name, asset.graspable is not False), []
+    config = EnvConfig(
+        task,
+        obs_mode="state",
+        split=_SPLIT,
+        objects=(str(asset.folder),),
+        sensors=sensors_for(pose),
+    )
+    named = (task, asset.name, asset.graspable is not False)
+    rows = []
     for seed in seeds:
         started = time.perf_counter()
         try:
-            result, _ = run_episode(config, EpisodeSpec(seed))
+            result, _ = run_episode(config, EpisodeSpec(seed), pose=pose)
         except InputError as error:
-            return [Row(*named, None, False, str(error), 0.0)]
-        reason = "" if result.success_at_end else f"{result.failure}: {result.reason}"
-        took = time.perf_counter() - started
-        rows.append(Row(*named, seed, result.success_at_end, reason, took))
+            return [Row(*named, None, False, str(error), 0.0, asset.category, pose)]
+        done, took = result.success_at_end, time.perf_counter() - started
+        reason = "" if done else f"{result.failure}: {result.reason}"
+        shift, turn = result.estimate_translation_error, result.estimate_rotation_error
+        cm = None if shift is None else 100 * shift
+        deg = None if turn is None else float(np.degrees(turn))
+        rows.append(Row(*named, seed, done, reason, took, asset.category, pose, cm, deg))
     return rows
 
 
@@ -105,7 +125,10 @@ def line_of(row: Row) -> str:
     """A row as people read it."""
     what = "refused" if row.seed is None else f"{row.seed:>4} {'yes' if row.succeeded else 'NO':<3}"
     name = row.object if row.graspable else f"({row.object})"
-    return f"{row.task:<32} {name:<36.36} {what} {row.seconds:5.0f} s  {row.reason}"
+    errors = ""
+    if row.error_cm is not None and row.error_deg is not None:
+        errors = f"{row.error_cm:4.1f} cm {row.error_deg:4.0f} deg  "
+    return f"{row.task:<32} {name:<36.36} {what} {row.seconds:5.0f} s  {errors}{row.reason}"
 
 
 def summary_of(rows: Sequence[Row]) -> str:

@@ -1,6 +1,6 @@
 """Rendered views of raw scans with their labels, without building assets: what `flip_table.py` reads.
 
-    python benchmarks/flips/scan_views.py google_scanned_objects PATH --out VIEWS/gso [--views 12] [--kinds labels.yaml]
+    python benchmarks/flips/scan_views.py google_scanned_objects PATH --out VIEWS/gso [--views 12] [--kinds benchmarks/flips/kinds.yaml]
         [--skip-every 3]
     python benchmarks/flips/scan_views.py catalogue --out VIEWS/catalogue [--views 12]
 

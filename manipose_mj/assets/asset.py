@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.geometry import Joint, MassProperties
-from manipose_mj.assets.label import PoseLabel
+from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
@@ -147,6 +147,11 @@ class Asset:
     def model_path(self) -> Path:
         """The MJCF file."""
         return self.folder / MODEL_FILE
+
+    @property
+    def object_type(self) -> ObjectType:
+        """Which rule of the conventions labels it."""
+        return self.label.object_type
 
     @property
     def graspable(self) -> bool | None:

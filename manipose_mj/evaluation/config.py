@@ -13,6 +13,7 @@ import numpy as np
 from manipose_mj.assets.categories import Split
 from manipose_mj.control.perception.source_names import (
     GRASP_SOURCES,
+    TOLD_OF_KINDS,
     GraspSource,
     default_grasps,
     masks_of,
@@ -204,7 +205,8 @@ class EvaluationConfig:
         objects, furniture = _POSES_OF[self.pose]
         if self.estimator is not None:
             objects = self.estimator.source
-        return {"objects": objects + wrong, "furniture": furniture}
+        told = {} if self.pose == "oracle" else {"kinds": TOLD_OF_KINDS}
+        return {"objects": objects + wrong, **told, "furniture": furniture}
 
     @property
     def pose_source(self) -> str:

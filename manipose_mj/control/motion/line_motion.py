@@ -98,7 +98,7 @@ def _digest(
     """Of all that a tracked line depends on; `ArmModel.follow` changes nothing of the model but places and turns."""
     found = hashlib.blake2b(options.encode(), digest_size=16)
     for values in (arm.model.body_pos, arm.model.body_quat, joints, poses):
-        found.update(np.ascontiguousarray(values))
+        found.update(values.tobytes())
     return found.digest()
 
 

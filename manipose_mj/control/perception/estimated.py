@@ -1,7 +1,8 @@
 """The perception of `pose="estimated"`: objects as cameras and the pose estimator have them.
 
 Of objects perception reads the task's observations of depth and segmentation, and each one's category,
-as an instance detector would give them. They never read an object's pose, model, label or name.
+as an instance detector would give them; of a category outside the catalogue also its object type
+(`object_kinds`). They never read an object's pose, model, name, or anything else of its label.
 Furniture and surroundings are a `World`'s.
 """
 
@@ -17,17 +18,18 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
-from manipose_mj.control.perception.known_shapes import KnownShape, known_shapes
-from manipose_mj.control.perception.object_views import ObjectView, ObjectViews
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
+from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
+from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.pose_sensing import (
     MIN_VIEW_POINTS,
     Estimator,
     SensedPose,
-    seen_points,
     sense_pose,
 )
-from manipose_mj.control.perception.source_names import GraspSource
+from manipose_mj.control.perception.source_names import TOLD_OF_KINDS, GraspSource
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
 from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
@@ -92,7 +94,7 @@ class EstimatedPerception:
         physics: mjcf.Physics,
         world: World | None = None,
         *,
-        estimators: Callable[[str], Estimator] | None = None,
+        estimators: Callable[[ObjectKind], Estimator] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
         grasps: GraspSource = "cloud",
     ) -> None:
@@ -103,7 +105,7 @@ class EstimatedPerception:
             through `SPARE_CAMERAS` and those over the shoulders where it has to.
           physics: The environment's.
           world: Furniture and surroundings; those of the simulator by default.
-          estimators: The estimator of a category; `PoseEstimator.load` by default.
+          estimators: The estimator of a kind; `PoseEstimator.load` by default.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
           grasps: Where grasps come from.
         """
@@ -126,6 +128,7 @@ class EstimatedPerception:
         self._keys = _keys(0)
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
+            "kinds": TOLD_OF_KINDS,
             "furniture": self._world.source,
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
@@ -135,12 +138,12 @@ class EstimatedPerception:
 
         Raises:
           StageFailure: An object that a goal is about is not seen.
-          InputError: There are no weights for a category.
+          InputError: There are no weights for a category or its type.
         """
         self._keys = _keys(seed)
         self._held, self._known, self._grasps = None, {}, {}
-        for category in self._categories().values():
-            self._load(category)  # what has no weights is told before anything is built
+        for kind in self._kinds().values():
+            self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
         self._find_objects()
         hidden = {goal.object for goal in self._task.goals if isinstance(goal, TakenOutGoal)}
@@ -179,11 +182,14 @@ class EstimatedPerception:
 
     def _find_objects(self) -> None:
         """Estimate what is seen for the first time."""
-        for name, category in self._categories().items():
+        for name, kind in self._kinds().items():
             if name in self._known:
                 continue
-            shapes = known_shapes(category)
-            sensed = self._sensed(name, self._views.of(self._physics, name), shapes)
+            views = self._views.of(self._physics, name)
+            sensed = self._sensed(name, views, shapes_of(kind))
+            if sensed is not None:
+                seen = views or self._more_views.of(self._physics, name)
+                sensed = sensed_if_flat(kind, sensed, seen)
             if sensed is not None:
                 self._known[name] = sensed
 
@@ -240,9 +246,9 @@ class EstimatedPerception:
         poses = {name: sensed.pose for name, sensed in self._known.items()}
         return self._world.observed(*self.robot(), poses)
 
-    def _categories(self) -> Mapping[str, str]:
-        """Of each object's category: all that is told about it."""
-        return {name: entity.asset.category for name, entity in self._task.objects.items()}
+    def _kinds(self) -> Mapping[str, ObjectKind]:
+        """The kind of each object: all that is told about it."""
+        return {name: object_kind(entity.asset) for name, entity in self._task.objects.items()}
 
     def _updated(self, name: str, tcp: Float[np.ndarray, "4 4"]) -> SensedPose:
         """The pose of an object after time has passed: where it was, or where the hand has
@@ -258,7 +264,7 @@ class EstimatedPerception:
         factor, more = _FITS
         if misfit <= factor * before.misfit + more and before.confidence >= _SURE:
             return before
-        sensed = self._sensed(name, views, (before.shape,))
+        sensed = self._sensed(name, views, OneShape(before.shape))
         if sensed is None or sensed.misfit > _BETTER * misfit:
             return before
         if held and not self._may_be_lost() and not _nearly(sensed, before):
@@ -272,10 +278,10 @@ class EstimatedPerception:
         return self.robot()[1] < self._held_width - _LOST
 
     def _sensed(
-        self, name: str, views: tuple[ObjectView, ...], shapes: tuple[KnownShape, ...]
+        self, name: str, views: tuple[ObjectView, ...], shapes: ShapeFitter
     ) -> SensedPose | None:
         """From these views; from all cameras' where they leave an object uncertain that was not known."""
-        estimator = self._load(self._categories()[name])
+        estimator = self._load(self._kinds()[name])
         sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
         if sensed is not None and (sensed.confidence >= _TRUSTED or name in self._known):
             return sensed
@@ -313,7 +319,7 @@ class EstimatedPerception:
         return tuple(replace(view, mesh=mesh) for view in views)
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
-        body = self._world.body(name)
+        body, kind = self._world.body(name), self._kinds()[name]
         return ObjectEstimate(
             name=name,
             pose=sensed.pose,
@@ -322,8 +328,10 @@ class EstimatedPerception:
             body=body,
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
-            category=self._categories()[name],
+            category=kind.category,
             uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
+            guessed_frame=not kind.in_catalogue
+            or kind.object_type != sensed.shape.label.object_type,
         )
 
 
@@ -333,10 +341,10 @@ def _nearly(sensed: SensedPose, before: SensedPose) -> bool:
     return bool(shift < _IN_HAND[0] and turn < _IN_HAND[1])
 
 
-def _load(category: str) -> Estimator:
+def _load(kind: ObjectKind) -> Estimator:
     from manipose_mj.ppf_jax.estimator import PoseEstimator  # loads JAX
 
-    return PoseEstimator.load(category)
+    return PoseEstimator.load(kind.category if kind.in_catalogue else kind.object_type)
 
 
 def _keys(seed: int) -> Callable[[], Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from manipose_mj.control.perception.object_views import ObjectView
+from manipose_mj.control.perception.objects.object_views import ObjectView
 from manipose_mj.estimators.answer import EstimatorFailedError
 from manipose_mj.estimators.observation import object_observation
 from manipose_mj.estimators.service import EstimatorService

@@ -10,10 +10,10 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.assets.gripper import ParallelJaw
 from manipose_mj.control.perception.cloud_grasps import cloud_grasps
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.observed_surface import observed_surface
-from manipose_mj.control.perception.pose_sensing import SensedPose, seen_points
+from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.grasp_sampling.grasp_choice import clear_of_plane
 from manipose_mj.poses import invert, transform

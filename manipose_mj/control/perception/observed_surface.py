@@ -12,11 +12,11 @@ from trimesh.convex import convex_hull
 
 from manipose_mj.assets.geometry import Shape
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.perception.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.symmetric_completion import symmetry_turns
 from manipose_mj.grasp_sampling.grasp_fit import ObjectCloud
 from manipose_mj.grasp_sampling.touch_points import SurfacePoints, first_in_cells, union_points
 
-_TURNS = 24  # of a cloud about its axis of revolution
 _AROUND = 0.012  # points that far away along the surface tell where it lies [m]
 _OFF = 0.012  # and no further off it; further ones are something that the fitted shape lacks [m]
 _NEAREST = 24  # of them
@@ -61,16 +61,7 @@ def completed(
 
     What is round is revolved, what has planes is mirrored.
     """
-    turns = list(label.symmetry.rotations)
-    if label.symmetry.axial:
-        angles = np.linspace(0, 2 * np.pi, _TURNS, endpoint=False)
-        about = [
-            np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
-            for a in angles
-        ]
-        turns = [turn @ other for turn in turns for other in about]
-    if label.object_type == "mirror":  # XY is a plane of all of these
-        turns += [turn @ np.diag([1.0, 1.0, -1.0]) for turn in turns]
+    turns = symmetry_turns(label.object_type, label.symmetry)
     return (
         np.concatenate([points @ turn.T for turn in turns]),
         np.concatenate([normals @ turn.T for turn in turns]),

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.perception.known_shapes import KnownShape, best_fit, nearest_shape
-from manipose_mj.control.perception.object_views import ObjectView
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
+from manipose_mj.control.perception.objects.shape_fits import ShapeFitter
 from manipose_mj.poses import invert, rotation_angle, transform
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class SensedPose:
 def sense_pose(
     estimator: Estimator,
     views: Sequence[ObjectView],
-    shapes: Sequence[KnownShape],
+    shapes: ShapeFitter,
     keys: Callable[[], Any],
 ) -> SensedPose | None:
     """The likeliest of all cameras' hypotheses: the one whose shape is nearest to all that is seen.
@@ -59,9 +60,9 @@ def sense_pose(
     then held against the points of all.
 
     Args:
-      estimator: Of the object's category.
+      estimator: Of the object's kind.
       views: At least one point each.
-      shapes: Of the category; one alone is taken as it is, of several the best is stretched to fit.
+      shapes: Find the shape that goes with each hypothesis.
       keys: A new random key at every call.
 
     Returns:
@@ -71,29 +72,21 @@ def sense_pose(
     if not views:
         return None
     points = seen_points(views)
-    best: SensedPose | None = None
-    least = np.inf
+    best, least = None, np.inf
     for view in views:
         estimate = estimator.estimate(view, key=keys())
         for hypothesis in _different([estimate, *estimate.hypotheses]):
             pose = view.T_world_camera @ hypothesis.pose.astype(float)
-            local = transform(invert(pose), points)
-            if len(shapes) == 1:
-                shape, misfit = shapes[0], shapes[0].misfit(local)
-            elif np.isnan(hypothesis.extents).any():  # nobody said: some known object as it is
-                shape, misfit = nearest_shape(shapes, local)
-            else:
-                shape, misfit = best_fit(shapes, _lengths(hypothesis, shapes[0]), local)
-            score = misfit * (1 + _DISTRUST * (1 - hypothesis.confidence))
+            found = shapes.fit(hypothesis, pose, views)
+            score = found.contradiction * (1 + _DISTRUST * (1 - hypothesis.confidence))
             if score < least:
-                least = score
-                best = SensedPose(pose, shape, misfit, hypothesis.confidence, view.camera)
-    return best
-
-
-def seen_points(views: Sequence[ObjectView]) -> Float[np.ndarray, "n 3"]:
-    """What all cameras see, in the world frame [m]."""
-    return np.concatenate([view.points_world for view in views])
+                least, best = score, (pose, found, hypothesis.confidence, view.camera)
+    if best is None:
+        return None
+    pose, found, confidence, camera = best
+    shape = found.shape()
+    misfit = shape.misfit(transform(invert(pose), points))
+    return SensedPose(pose, shape, misfit, confidence, camera)
 
 
 def _different(hypotheses: Sequence[PoseEstimate]) -> list[PoseEstimate]:
@@ -110,11 +103,3 @@ def _different(hypotheses: Sequence[PoseEstimate]) -> list[PoseEstimate]:
 def _alike(one: Float[np.ndarray, "4 4"], other: Float[np.ndarray, "4 4"]) -> bool:
     shift = float(np.linalg.norm(one[:3, 3] - other[:3, 3]))
     return shift < _SAME[0] and float(rotation_angle(one[:3, :3], other[:3, :3])) < _SAME[1]
-
-
-def _lengths(hypothesis: PoseEstimate, shape: KnownShape) -> Float[np.ndarray, "3"]:
-    """The estimated extents [m]; what is round stays so."""
-    extents = np.maximum(hypothesis.extents.astype(float), 1e-3)
-    if shape.label.symmetry.axial:
-        extents[1:] = extents[1:].mean()
-    return extents

@@ -90,7 +90,7 @@ def _perception(
         task,
         physics,
         world,
-        estimators=lambda category: ForeignEstimator(service, category),
+        estimators=lambda kind: ForeignEstimator(service, kind.category),
         meshes=_mesh_of if estimator.give_cad else None,
         grasps=grasps,
     )

@@ -16,7 +16,7 @@ class Perception(Protocol):
     """Where a policy's knowledge comes from.
 
     Attributes:
-      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`.
+      sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`; what is told of `"kinds"`.
       feels_joints: Whether it corrects joints by what the hand feels.
       unseen: Objects of goals that nothing has shown yet.
     """

@@ -10,6 +10,8 @@ MaskSource = Literal["oracle", "none"]
 MASK_SOURCES: tuple[MaskSource, ...] = get_args(MaskSource)
 GraspSource = Literal["annotated", "shape", "cloud"]
 GRASP_SOURCES: tuple[GraspSource, ...] = get_args(GraspSource)
+# What is told about objects whose poses are estimated, for reports.
+TOLD_OF_KINDS = "category; object type as well where the catalogue lacks the category"
 
 
 def default_grasps(pose: str) -> GraspSource:

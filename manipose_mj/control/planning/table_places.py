@@ -24,6 +24,10 @@ PLACES = tuple(
 )  # fmt: skip
 YAWS = tuple(float(yaw) for yaw in np.linspace(-np.pi, np.pi, 8, endpoint=False))
 _UPRIGHT = 0.97  # cosine to the vertical from which on a rest counts as upright
+_SETTLES = (
+    0.02,
+    np.deg2rad(15.0),
+)  # how far from a pose at rest what is asked for may seem to be [m, rad]
 _SAME_REST = 0.995  # cosine between verticals from which on two rests are one
 
 
@@ -59,6 +63,36 @@ def poses_with_rotation(
     own = obj.label_pose[:2, 3]
     order = sorted(PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
     return tuple(compose(rotation, np.array([x, y, height])) for x, y in order)
+
+
+def settled(obj: ObjectEstimate, label_pose: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+    """The pose next to `label_pose` in which an object of a guessed frame lies still on what it lies on now.
+
+    What is asked for is a pose at rest. An estimate that is some degrees off would have one end in the table there.
+    """
+    now = _nearest_rest(obj, obj.label_pose[:3, :3])
+    then = _nearest_rest(obj, label_pose[:3, :3])
+    if now is None or then is None:
+        return label_pose
+    heights = [rest.height + float(rest.rotation[2] @ obj.label.origin) for rest in (now, then)]
+    up = obj.label.rotation.T @ then.rotation[2]  # of the world, in the label's frame
+    asked = label_pose[2, :3]
+    axis = np.cross(asked, up)
+    angle = np.arctan2(np.linalg.norm(axis), asked @ up)
+    turn = np.eye(3) if angle < 1e-6 else rotation_about(axis / np.linalg.norm(axis), -angle)
+    found = compose(label_pose[:3, :3] @ turn, label_pose[:3, 3].copy())
+    height = obj.label_pose[2, 3] - heights[0] + heights[1] + DROP_HEIGHT
+    if abs(height - label_pose[2, 3]) < _SETTLES[0]:
+        found[2, 3] = height
+    return found
+
+
+def _nearest_rest(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> StablePose | None:
+    """The stable pose that a label turned so is nearest to, if it is near."""
+    down = rotation[2] @ obj.label.rotation.T
+    best = max(obj.rests, key=lambda rest: float(rest.rotation[2] @ down), default=None)
+    near = best is not None and float(best.rotation[2] @ down) > np.cos(_SETTLES[1])
+    return best if near else None
 
 
 def upright_poses(obj: ObjectEstimate) -> tuple[Float[np.ndarray, "4 4"], ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Plan, Step
 from manipose_mj.control.planning.regrasp import Poses, routes
-from manipose_mj.control.planning.table_places import poses_with_rotation, upright_poses
+from manipose_mj.control.planning.table_places import poses_with_rotation, settled, upright_poses
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.tasks.goals import OrientationGoal, PoseGoal, UprightGoal
 
@@ -46,7 +46,7 @@ def place(name: str, poses: Poses) -> Plan:
 def destinations(goal: RestGoal, obj: ObjectEstimate) -> Poses:
     """`T_world_label` that meet the goal, the likeliest first."""
     if isinstance(goal, PoseGoal):
-        return (goal.pose,)
+        return (settled(obj, goal.pose), goal.pose) if obj.guessed_frame else (goal.pose,)
     if isinstance(goal, OrientationGoal):
         return poses_with_rotation(obj, goal.rotation)
     return upright_poses(obj)

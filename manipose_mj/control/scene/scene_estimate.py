@@ -32,6 +32,8 @@ class ObjectEstimate:
       rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
       category: Such as `"mug"`; empty where it is not known.
       uncertainty: How far its surface may be from where the planning scene has it [m].
+      guessed_frame: Whether where its label is in it is but a guess, its shape being that of its own cloud: a pose that
+        is asked for then leaves it a little in the air or in what it shall lie on.
     """
 
     name: str
@@ -43,6 +45,7 @@ class ObjectEstimate:
     rests: tuple[StablePose, ...] = ()
     category: str = ""
     uncertainty: float = 0.0
+    guessed_frame: bool = False
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:

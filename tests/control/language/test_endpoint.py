@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import threading
 import time
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 
 import pytest
 
@@ -17,6 +16,7 @@ from manipose_mj.control.language.exchanges import ReplayModel, read_exchanges
 from manipose_mj.control.language.planner import MAX_REPAIRS, LanguagePlanner
 from manipose_mj.control.language.reply import reply_schema
 from manipose_mj.errors import InputError
+from tests.control.language.local_server import Server, says, send, status
 from tests.control.language.scenes import kitchen
 
 KEY = "sk-secret-of-this-test"
@@ -32,59 +32,6 @@ GOOD = json.dumps(
 )
 UNKNOWN = GOOD.replace("top_drawer", "fridge")
 UNORDERED = json.dumps({"plan": [{"primitive": "release", "subject": "mug"}], "refusal": ""})
-
-
-class Server:
-    """Answers with one behaviour after the other; remembers what it was asked."""
-
-    def __init__(self, behaviours: list) -> None:
-        self.behaviours, self.requests = behaviours, []
-        outer = self
-
-        class Handler(BaseHTTPRequestHandler):
-            def do_POST(self) -> None:
-                length = int(self.headers["Content-Length"])
-                outer.requests.append(json.loads(self.rfile.read(length)))
-                outer.behaviours.pop(0)(self)
-
-            def log_message(self, *_) -> None: ...
-
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.url = f"http://127.0.0.1:{self._server.server_port}/v1"
-        threading.Thread(target=self._server.serve_forever, daemon=True).start()
-
-    def close(self) -> None:
-        self._server.shutdown()
-        self._server.server_close()
-
-
-def says(text: str | None, **message):
-    """Answer as an endpoint does."""
-
-    def answer(handler: BaseHTTPRequestHandler) -> None:
-        choice = {
-            "index": 0,
-            "finish_reason": "stop",
-            "message": {"role": "assistant", "content": text, **message},
-        }
-        body = {"id": "1", "object": "chat.completion", "created": 0, "model": "m"}
-        send(handler, 200, json.dumps({**body, "choices": [choice]}))
-
-    return answer
-
-
-def status(code: int, **headers):
-    return lambda handler: send(handler, code, '{"error": {"message": "no"}}', **headers)
-
-
-def send(handler: BaseHTTPRequestHandler, code: int, body: str, **headers) -> None:
-    handler.send_response(code)
-    handler.send_header("Content-Type", "application/json")
-    handler.send_header("Content-Length", str(len(body)))
-    for name, value in headers.items():
-        handler.send_header(name.replace("_", "-"), value)
-    handler.end_headers()
-    handler.wfile.write(body.encode())
 
 
 def hangs(handler: BaseHTTPRequestHandler) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.tasks.core.task import ManipulationTask
 
 
@@ -59,7 +60,7 @@ class DeniedTask(ManipulationTask):
             return _Robot(task.robot)
         if name == "objects":
             return {
-                each: SimpleNamespace(asset=SimpleNamespace(category=entity.asset.category))
+                each: SimpleNamespace(asset=_told(entity.asset))
                 for each, entity in task.objects.items()
             }
         if name == "task_observables":
@@ -68,6 +69,13 @@ class DeniedTask(ManipulationTask):
             names = task.env_config.sensors.camera_names
             return SimpleNamespace(sensors=SimpleNamespace(camera_names=names))
         raise PrivilegedError(f"task.{name}")
+
+
+def _told(asset: Any) -> SimpleNamespace:
+    """The category; the object type as well where the catalogue lacks the category."""
+    if asset.category in CATALOGUE:
+        return SimpleNamespace(category=asset.category)
+    return SimpleNamespace(category=asset.category, object_type=asset.object_type)
 
 
 class _Robot:

@@ -14,8 +14,8 @@ from manipose_mj.assets.geometry import MassProperties
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.perception.cloud_grasps import cloud_grasps
 from manipose_mj.control.perception.grasp_sources import resting, sensed_grasps
-from manipose_mj.control.perception.known_shapes import KnownShape
-from manipose_mj.control.perception.object_views import ObjectView
+from manipose_mj.control.perception.objects.known_shapes import KnownShape
+from manipose_mj.control.perception.objects.object_views import ObjectView
 from manipose_mj.control.perception.observed_surface import completed, observed_surface
 from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.control.perception.source_names import GRASP_SOURCES

@@ -8,7 +8,7 @@ import pytest
 from manipose_mj import suite
 from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
-from manipose_mj.control.perception.known_shapes import known_shapes
+from manipose_mj.control.perception.objects.known_shapes import known_shapes
 from manipose_mj.control.perception.pose_sources import make_perception, sensors_for
 from manipose_mj.errors import ServerLostError
 from manipose_mj.estimators.loading import load_estimator
@@ -57,7 +57,10 @@ def truth(cup):
 def perceived(cup, estimator, **options) -> EstimatedPerception:
     service = EstimatorService("mine", estimator)
     return EstimatedPerception(
-        cup.task, cup.physics, estimators=lambda c: ForeignEstimator(service, c), **options
+        cup.task,
+        cup.physics,
+        estimators=lambda kind: ForeignEstimator(service, kind.category),
+        **options,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from manipose_mj import suite
@@ -54,6 +56,14 @@ def test_a_whole_episode_reads_nothing_privileged(task, monkeypatch, optimised):
     environment = an_environment(task, "estimated")
     steps = 4000 if task.startswith("articulated") else 300
     assert act(environment, "estimated", monkeypatch, steps) >= 250
+
+
+@pytest.mark.full
+def test_a_kind_outside_the_catalogue_is_told_by_category_and_type_alone(monkeypatch, optimised):
+    environment = an_environment("single_object/target_pose", "estimated")
+    cup = environment.task.object
+    monkeypatch.setattr(cup, "asset", replace(cup.asset, category="beaker"))
+    assert act(environment, "estimated", monkeypatch, 300) >= 250
 
 
 @pytest.mark.parametrize("pose", ["oracle", "estimated_objects"])

@@ -68,6 +68,11 @@ class ObjectView:
         return transform(self.T_world_camera, self.points.astype(float))
 
 
+def seen_points(views: Sequence[ObjectView]) -> Float[np.ndarray, "n 3"]:
+    """What all cameras see, in the world frame [m]."""
+    return np.concatenate([view.points_world for view in views])
+
+
 class ObjectViews:
     """Crops objects out of a task's depth images by its segmentation."""
 

@@ -1,0 +1,62 @@
+"""An episode that a language model plans, and the same once more from what it said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipose_mj.cli.main import main
+from manipose_mj.control.language.endpoint import KEY_VARIABLE
+from manipose_mj.evaluation.records import (
+    EpisodeResult,
+    read_results,
+    read_trajectory,
+    trajectory_path,
+)
+from tests.control.language.local_server import Server, says
+
+TASK = "single_object/target_pose"
+KEY = "sk-secret-of-this-test"
+PLAN = json.dumps(
+    {
+        "plan": [
+            {"primitive": "grasp_at", "subject": "object"},
+            {"primitive": "move_to", "subject": "object", "destination": "goal of object"},
+            {"primitive": "release", "subject": "object"},
+        ],
+        "refusal": "",
+    }
+)
+
+
+def played(out: Path) -> EpisodeResult:
+    """The one episode of an evaluation, without the times that it took."""
+    (result,), _ = read_results(out / "results.jsonl")
+    return replace(result, wall_s=0.0, policy_s=0.0)
+
+
+@pytest.mark.full
+def test_an_episode_by_a_model_is_the_same_when_its_answers_are_replayed(tmp_path, monkeypatch):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    server = Server([says("I would pick it up."), says(PLAN)])
+    episode = [TASK, "--episodes", "1", "--objects", "cup_004", "--jobs", "1"]
+    asked, replayed = tmp_path / "asked", tmp_path / "replayed"
+    model = ["--planner", "llm", "--model", "m", "--base-url", server.url]
+    try:
+        assert main(["evaluate", *episode, *model, "--out", str(asked)]) == 0
+    finally:
+        server.close()
+    assert len(server.requests) == 2, "a plan, and one mistake that was put right"
+    from_file = ["--planner", "replay", "--replay", str(asked / "exchanges")]
+    assert main(["evaluate", *episode, *from_file, "--out", str(replayed)]) == 0
+    first, second = played(asked), played(replayed)
+    assert first.success_at_end, first.reason
+    assert first == second
+    paths = [read_trajectory(trajectory_path(out, TASK, 0)) for out in (asked, replayed)]
+    np.testing.assert_array_equal(paths[0].qpos, paths[1].qpos)
+    written = [path.read_bytes() for path in asked.rglob("*") if path.is_file()]
+    assert written and not any(KEY.encode() in content for content in written)
