@@ -96,7 +96,7 @@ def cause_of(reason: str, name: str) -> str:
         return "its whole category is too long"
     words = re.sub(r"^\S+: ", "", reason).replace(name, "it").split(";")[0]
     words = re.sub(r"\d+(\.\d+)?( x \d+(\.\d+)?)*", "#", words)
-    return re.sub(r"'\w+'", "the part", words)
+    return re.sub(r"(part )?'\w+'", "the part", words)
 
 
 def lines_of(task: str, asked: int, refusals: Sequence[Refusal]) -> list[str]:
