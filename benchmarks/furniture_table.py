@@ -1,11 +1,12 @@
 """Every handled drawer and door of some furniture, opened and shut by the baseline, part by part.
 
     python benchmarks/furniture_table.py [--assets DIR] [--only NAME ...] [--skip NAME ...] [--seeds 0 1]
-        [--parts NAME ...] [--verbs open close] [--pose estimated] [--jobs 2]
+        [--parts NAME ...] [--verbs open close] [--pose estimated] [--jobs 2] [--list]
 
 Without a folder: the catalogue's test cabinets, microwaves and ovens. One line a part and verb: how many of the
-seeds succeeded, and why the others did not. A part without a handle is left out. With `--pose estimated` handles,
-joints and openings come from what the cameras see, not from the simulator.
+seeds succeeded, and why the others did not. Before that, one line a part that is not played, with the reason.
+`--list` prints those lines and the parts that are played, and plays none. With `--pose estimated` handles, joints and
+openings come from what the cameras see, not from the simulator.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import argparse
 import multiprocessing
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -40,6 +41,9 @@ from manipose_mj.tasks.core.scene_objects import SceneObjects  # noqa: E402
 
 _FURNITURE = ("cabinet", "microwave", "oven")
 _SPLIT = "test"
+_WIDEST = MAX_OPENING - MIN_CLEARANCE  # that the gripper takes between its fingers [m]
+# Names of what opens, as built: `door_0`; the others are knobs, buttons and trays.
+_OPENING = ("drawer", "door", "lid", "flap")
 
 
 @dataclass(frozen=True)
@@ -83,13 +87,23 @@ def main() -> None:
     parser.add_argument("--pose", choices=POSE_SOURCES, default="oracle")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--list", action="store_true", help="play nothing")
     options = parser.parse_args()
+    assets = [
+        (folder, asset)
+        for folder, asset in assets_in(options.assets)
+        if (not options.only or asset.name in options.only) and asset.name not in options.skip
+    ]
+    for _, asset in assets:
+        for line in listed(asset, played=options.list):
+            print(line)
+    if options.list:
+        return
     cases = [
         Case(folder, asset.name, part.name, verb, tuple(options.seeds), options.pose)
-        for folder, asset in _assets(options.assets)
-        if (not options.only or asset.name in options.only) and asset.name not in options.skip
-        for part in asset.parts
-        if part.handle is not None and (not options.parts or part.name in options.parts)
+        for folder, asset in assets
+        for part in handled_parts(asset)
+        if not options.parts or part.name in options.parts
         for verb in options.verbs
     ]
     rows = []
@@ -112,12 +126,7 @@ def run(case: Case) -> Row:
     started = time.perf_counter()
     asset = case.load()
     part = asset.part(case.part)
-    config = EnvConfig(
-        f"furniture/{case.verb}_{kind_of(part)}",
-        obs_mode="state",
-        objects=(str(asset.folder),),
-        sensors=sensors_for(case.pose),
-    )
+    config = replace(config_for(asset, part, case.verb), sensors=sensors_for(case.pose))
     reasons = []
     for seed in case.seeds:
         spec = EpisodeSpec(seed, furniture=asset.name, part=part.name)
@@ -126,6 +135,44 @@ def run(case: Case) -> Row:
         reasons.append("" if done else f"{result.failure}: {result.reason}")
     seconds = time.perf_counter() - started
     return Row(case, kind_of(part), _width(part), tuple(reasons), seconds)
+
+
+def config_for(asset: Asset, part: MovingPart, verb: str) -> EnvConfig:
+    """The environment in which a part with a handle is opened or shut, whatever furniture it is of."""
+    task = f"furniture/{verb}_{kind_of(part)}"
+    return EnvConfig(task, obs_mode="state", objects=(str(asset.folder),))
+
+
+def handled_parts(asset: Asset) -> list[MovingPart]:
+    """The parts that are played."""
+    return [part for part in asset.parts if part.handle is not None]
+
+
+def listed(asset: Asset, *, played: bool) -> list[str]:
+    """One line for each part that is not played, with the reason; those that are played too, if asked for.
+
+    Knobs and buttons of one asset share a line.
+    """
+    lines = []
+    for part in handled_parts(asset) if played else []:
+        across = f"handle of {1000 * _width(part):.0f} mm"
+        wide = "" if _width(part) <= _WIDEST else ", wider than the gripper"
+        lines.append(f"played  {asset.name:<16}{part.name:<16}{kind_of(part)}: {across}{wide}")
+    for part in asset.parts:
+        if part.handle is None and not _is_control(part):
+            lines.append(f"skipped {asset.name:<16}{part.name:<16}no handle in the data")
+    controls = [part.name for part in asset.parts if _is_control(part)]
+    if controls:
+        lines.append(
+            f"skipped {asset.name:<16}{len(controls)} knobs, buttons or trays: no task moves them"
+        )
+    if not any(part.name.startswith(_OPENING) for part in asset.parts):
+        lines.append(f"skipped {asset.name:<16}-               no drawer, door or lid moves")
+    return lines
+
+
+def _is_control(part: MovingPart) -> bool:
+    return part.handle is None and not part.name.startswith(_OPENING)
 
 
 def _moving(requested: Literal["open", "shut"]) -> DrawnTaskFactory:
@@ -145,7 +192,8 @@ for _kind in ("drawer", "door", "flap"):
     register_task("furniture", f"close_{_kind}", draws=_draws)(_moving("shut"))
 
 
-def _assets(folder: Path | None) -> Iterator[tuple[Path | None, Asset]]:
+def assets_in(folder: Path | None) -> Iterator[tuple[Path | None, Asset]]:
+    """Furniture of asset folders, each with its folder; None: the catalogue's."""
     if folder is None:
         for category in _FURNITURE:
             row = CATALOGUE[category]
@@ -165,7 +213,7 @@ def _width(part: MovingPart) -> float:
 
 
 def _fits(row: Row) -> bool:
-    return row.width <= MAX_OPENING - MIN_CLEARANCE
+    return row.width <= _WIDEST
 
 
 def _interval(done: int, count: int) -> str:

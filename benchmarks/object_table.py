@@ -2,10 +2,12 @@
 
     manipose assets build ycb PATH --out SCANS/ycb
     python benchmarks/object_table.py --assets SCANS/ycb [SCANS/gso ...] [--tasks single_object/target_pose ...]
-        [--pose estimated] [--only NAME ...] [--skip NAME ...] [--seeds 0 1] [--json FILE]
+        [--pose estimated] [--only NAME ...] [--skip NAME ...] [--every N] [--seeds 0 1] [--json FILE]
+    python benchmarks/object_table.py --drawn --tasks "articulated/take_out_*" [--seeds 0 1]
 
-Without a folder: one test object of each rigid category of the catalogue, `--each` another one (0: the first).
-One line an episode; then of each task how many succeeded of those that it takes, and why it takes the others not.
+Without a folder: one test object of each rigid category of the catalogue, `--each` another one (0: the first); with
+`--drawn` what each seed draws of all test objects and furniture. Names of tasks may hold `*` and `?`. One line an
+episode; then of each task how many succeeded of those that it takes, and why it takes the others not.
 Objects of whose grasps too few survived the trials of the build are in brackets; they do not count. With estimated
 poses a failure names its stage: `perception` where the pose that was acted on was beyond the tolerance of success.
 """
@@ -13,6 +15,7 @@ poses a failure names its stage: `perception` where the pose that was acted on w
 from __future__ import annotations
 
 import argparse
+import fnmatch
 import json
 import time
 from collections import Counter
@@ -31,10 +34,11 @@ from manipose_mj.assets.asset import Asset  # noqa: E402
 from manipose_mj.assets.asset_json import list_assets, read_asset  # noqa: E402
 from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
 from manipose_mj.control.perception.pose_sources import POSE_SOURCES, sensors_for  # noqa: E402
-from manipose_mj.errors import InputError  # noqa: E402
+from manipose_mj.errors import InputError, unknown_name  # noqa: E402
 from manipose_mj.evaluation.episode import run_episode  # noqa: E402
 from manipose_mj.evaluation.statistics import wilson_interval  # noqa: E402
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec  # noqa: E402
+from manipose_mj.tasks.core.registry import all_tasks  # noqa: E402
 
 TASKS = ("single_object/target_pose", "articulated/store_middle_drawer")
 _SPLIT = "test"
@@ -70,54 +74,72 @@ def main() -> None:
         "--assets", nargs="+", type=Path, default=[], help="folders of asset folders"
     )
     parser.add_argument("--each", type=int, default=0, help="which test object of a category")
+    parser.add_argument("--drawn", action="store_true", help="objects that the seeds draw")
+    parser.add_argument("--every", type=int, default=1, help="take every so many of the objects")
     parser.add_argument("--pose", choices=POSE_SOURCES, default="oracle")
-    parser.add_argument("--tasks", nargs="+", default=list(TASKS))
+    parser.add_argument("--tasks", nargs="+", default=list(TASKS), help="names or patterns")
     parser.add_argument("--only", nargs="+", default=[], help="names of assets")
     parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--json", type=Path, help="where to write the rows")
     options = parser.parse_args()
-    assets = _scans(options.assets) if options.assets else _of_catalogue(options.each)
-    assets = [
-        asset
-        for asset in assets
-        if (not options.only or asset.name in options.only) and asset.name not in options.skip
-    ]
-    rows: list[Row] = []
-    for task in options.tasks:
-        for asset in assets:
+    tasks, rows = tasks_named(options.tasks), []
+    for task in tasks:
+        for asset in _chosen(options):
             for row in played(task, asset, options.seeds, options.pose):
                 rows.append(row)
                 print(line_of(row), flush=True)
-    for task in options.tasks:
+    for task in tasks:
         print(summary_of([row for row in rows if row.task == task]))
     if options.json is not None:
         options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
 
 
-def played(task: str, asset: Asset, seeds: Sequence[int], pose: str) -> list[Row]:
-    """An episode of each seed; one row with the reason where the task does not take the object."""
+def tasks_named(patterns: Sequence[str]) -> list[str]:
+    """The tasks of these names or patterns, in the order of the patterns.
+
+    Raises:
+      InputError: A pattern fits no task.
+    """
+    known = ["/".join(task) for task in all_tasks()]
+    found: dict[str, None] = {}
+    for pattern in patterns:
+        fitting = fnmatch.filter(known, pattern)
+        if not fitting:
+            raise unknown_name("task", pattern, known)
+        found.update(dict.fromkeys(fitting))
+    return list(found)
+
+
+def played(task: str, asset: Asset | None, seeds: Sequence[int], pose: str) -> list[Row]:
+    """An episode of each seed; one row with the reason where the task does not take the object.
+
+    Args:
+      task: `"domain/name"`.
+      asset: That it is about; None: what each seed draws.
+      seeds: Of the episodes.
+      pose: Where poses come from.
+    """
+    objects = None if asset is None else (str(asset.folder),)
     config = EnvConfig(
-        task,
-        obs_mode="state",
-        split=_SPLIT,
-        objects=(str(asset.folder),),
-        sensors=sensors_for(pose),
+        task, obs_mode="state", split=_SPLIT, objects=objects, sensors=sensors_for(pose)
     )
-    named = (task, asset.name, asset.graspable is not False)
-    rows = []
+    graspable, rows = asset is None or asset.graspable is not False, []
+    category = "" if asset is None else asset.category
     for seed in seeds:
         started = time.perf_counter()
         try:
             result, _ = run_episode(config, EpisodeSpec(seed), pose=pose)
         except InputError as error:
-            return [Row(*named, None, False, str(error), 0.0, asset.category, pose)]
+            name = "" if asset is None else asset.name
+            return [Row(task, name, graspable, None, False, str(error), 0.0, category, pose)]
         done, took = result.success_at_end, time.perf_counter() - started
         reason = "" if done else f"{result.failure}: {result.reason}"
         shift, turn = result.estimate_translation_error, result.estimate_rotation_error
         cm = None if shift is None else 100 * shift
         deg = None if turn is None else float(np.degrees(turn))
-        rows.append(Row(*named, seed, done, reason, took, asset.category, pose, cm, deg))
+        name = result.object if asset is None else asset.name
+        rows.append(Row(task, name, graspable, seed, done, reason, took, category, pose, cm, deg))
     return rows
 
 
@@ -147,6 +169,18 @@ def _cause(reason: str) -> str:
     """A refusal without the object's folder and figures."""
     words = reason.split(": ", 1)[-1]
     return "".join("#" if letter.isdigit() else letter for letter in words)[:_SHORT]
+
+
+def _chosen(options: argparse.Namespace) -> Sequence[Asset | None]:
+    if options.drawn:
+        return [None]
+    assets = _scans(options.assets) if options.assets else _of_catalogue(options.each)
+    named = [
+        asset
+        for asset in assets
+        if (not options.only or asset.name in options.only) and asset.name not in options.skip
+    ]
+    return named[:: options.every]
 
 
 def _scans(folders: Sequence[Path]) -> list[Asset]:

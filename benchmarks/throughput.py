@@ -3,7 +3,8 @@
 python benchmarks/throughput.py [--only TASK ...] [--episodes N]
 python benchmarks/throughput.py --engine warp|c --only TASK [--worlds N ...]: see batch_throughput.py
 
-All in one run: compare ratios. Others are measured where they are installed and run: dm_control's
+All in one run: compare ratios. Times are CPU time, which other programs do not stretch as they do the clock's. Ours keep
+the objects of their first episode; `experiments/scene_swaps.py` times resets to others. Others are measured where they are installed and run: dm_control's
 `stack_2_bricks_features` (always), Gymnasium-Robotics' FetchPickAndPlace, robosuite's Lift. Every
 environment is stepped with state observations under small random actions, ten control steps at a time in
 turn with the others, so that a busy machine slows all alike; the median is reported.
@@ -20,6 +21,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import batch_throughput
 import mujoco
@@ -28,6 +30,7 @@ from dm_control import manipulation
 
 from manipose_mj import suite
 from manipose_mj.evaluation.statistics import machine
+from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.observations.sensors import SensorConfig
 
 RESETS = 30
@@ -85,16 +88,15 @@ def _rates(runners: list[Runner]) -> dict[str, float]:
     seconds: dict[str, list[float]] = {runner.name: [] for runner in runners}
     for _ in range(TURNS):
         for runner in runners:
-            started = time.perf_counter()
+            started = time.process_time()
             for _ in range(STEPS):
                 runner.step()
-            seconds[runner.name].append(time.perf_counter() - started)
+            seconds[runner.name].append(time.process_time() - started)
     return {r.name: STEPS * r.substeps / statistics.median(seconds[r.name]) for r in runners}
 
 
 def _ours(domain: str, task: str) -> Runner:
-    environment = suite.load(domain, task, seed=0, obs_mode="state")
-    environment.reset()
+    environment = _same_objects(domain, task, obs_mode="state")
     joints, opening = environment.task.robot.configuration(environment.physics)
     home, rng = np.append(joints, opening), np.random.default_rng(0)
     limits = environment.action_spec()
@@ -105,6 +107,18 @@ def _ours(domain: str, task: str) -> Runner:
 
     substeps = environment.task.physics_steps_per_control_step
     return Runner(f"{domain}/{task}", step, substeps, environment.reset)
+
+
+def _same_objects(domain: str, task: str, **options: Any) -> TaskEnvironment:
+    """A task after a reset, whose episodes all have the objects of the first."""
+    first = suite.load(domain, task, seed=0, obs_mode="state")
+    first.reset()
+    drawn = first.scene_objects
+    objects = None if drawn is None else drawn.assets
+    first.close()
+    environment = suite.load(domain, task, seed=0, objects=objects, **options)
+    environment.reset()
+    return environment
 
 
 def _reference() -> Runner:
@@ -169,13 +183,10 @@ def _gym_step(environment) -> None:
 
 def _cloud(domain: str, task: str) -> float:
     """Median time of the fused cloud [ms], every time of another moment."""
-    environment = suite.load(
-        domain, task, seed=0, obs_mode="pointcloud", sensors=SensorConfig(height=120, width=160)
-    )
-    environment.reset()
+    sensors = SensorConfig(height=120, width=160)
+    environment = _same_objects(domain, task, obs_mode="pointcloud", sensors=sensors)
     joints, opening = environment.task.robot.configuration(environment.physics)
-    blind = suite.load(domain, task, seed=0, obs_mode="state")
-    blind.reset()
+    blind = _same_objects(domain, task, obs_mode="state")
     action, taken = np.append(joints, opening), []
     for _ in range(CLOUDS):
         with_cloud = _milliseconds(functools.partial(environment.step, action))
@@ -185,8 +196,7 @@ def _cloud(domain: str, task: str) -> float:
 
 def _growth(task: tuple[str, str], episodes: int) -> None:
     """Print how reset times and memory change over many episodes."""
-    environment = suite.load(*task, seed=0, obs_mode="state")
-    environment.reset()
+    environment = _same_objects(*task, obs_mode="state")
     resets, memory = [], []
     for _ in range(episodes):
         resets.append(_milliseconds(environment.reset))
@@ -200,9 +210,9 @@ def _growth(task: tuple[str, str], episodes: int) -> None:
 
 
 def _milliseconds(work: Callable[[], object]) -> float:
-    started = time.perf_counter()
+    started = time.process_time()
     work()
-    return (time.perf_counter() - started) * 1e3
+    return (time.process_time() - started) * 1e3
 
 
 if __name__ == "__main__":

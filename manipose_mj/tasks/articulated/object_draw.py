@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -42,11 +42,12 @@ class FurnitureDraw:
     def __init__(
         self, requested: RequestedFurniture, env_config: EnvConfig, *, hollow: bool
     ) -> None:
-        """Loads what the user chose; of that, furniture takes the place of the built-in pieces."""
+        """Loads what the user chose; of that, furniture of any layout takes the place of the built-in pieces."""
         own = _own(env_config, rigid=False)
+        choice = replace(requested.choice, any_layout=bool(own))
         rows = [CATALOGUE[name] for name in requested.categories]
         pool = own or builtin(env_config.split, rows)
-        self._parts = partial(possible_parts, choice=requested.choice, hollow=hollow)
+        self._parts = partial(possible_parts, choice=choice, hollow=hollow)
         self.pieces = Candidates(pool, self._parts)
 
     def draw(self, rng: np.random.RandomState, spec: EpisodeSpec) -> tuple[Asset, MovingPart]:

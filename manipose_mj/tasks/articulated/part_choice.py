@@ -23,10 +23,17 @@ class PartChoice:
       kinds: What it may be, the best first: a drawer slides, a door turns about the vertical, a flap
         about a level axis.
       level: Which rows of those, by the height of their handles; None: all.
+      any_layout: Whether the middle of one or two rows means something too: the upper one.
     """
 
     kinds: tuple[PartKind, ...]
     level: Level | None = None
+    any_layout: bool = False
+
+    @property
+    def least_rows(self) -> int:
+        """How many rows of a kind a piece must have."""
+        return 1 if self.level is None or self.any_layout else _LEAST[self.level]
 
     def __str__(self) -> str:
         what = " or ".join(self.kinds)
@@ -57,7 +64,7 @@ def possible_parts(asset: Asset, choice: PartChoice, *, hollow: bool) -> tuple[M
     handled = [part for part in asset.parts if part.handle is not None]
     for kind in choice.kinds:
         rows = rows_of([part for part in handled if kind_of(part) == kind])
-        if len(rows) < (1 if choice.level is None else _LEAST[choice.level]):
+        if len(rows) < choice.least_rows:
             continue
         found = _at_level(rows, choice.level)
         if not hollow:

@@ -81,7 +81,8 @@ OPENABLES: dict[str, Openable] = {
     },
     "cabinet_door": Openable(
         "a door of a cabinet",
-        RequestedFurniture(_ANY_CABINET, PartChoice(("door",))),
+        # Doors that lift are real cupboards' alone.
+        RequestedFurniture(_ANY_CABINET, PartChoice(("door", "flap"))),
         _BEFORE,
         start_open=_PAST_HOME,
         shut=0.95,

@@ -19,6 +19,9 @@ from manipose_mj.tasks.articulated.cavity_placement import resting, ways_to_lie
 from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of, possible_parts
 from manipose_mj.tasks.articulated.part_room import outwards_of, room_at
 from manipose_mj.tasks.articulated.registered import OPENABLES
+from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.registry import named_task
+from manipose_mj.tasks.core.scene_source import SceneSource
 from manipose_mj.tasks.core.start import NoStartError
 from manipose_mj.tasks.goals.conditions import inside_cavity
 from tests.few_objects import load
@@ -68,6 +71,24 @@ def test_the_level_of_a_drawer_is_its_height(level, name):
     asset = catalogue.load("cabinet", 0)
     (part,) = possible_parts(asset, PartChoice(("drawer",), level), hollow=True)
     assert part.name == name
+
+
+def test_a_users_piece_has_a_middle_drawer_whatever_its_layout():
+    asset = catalogue.load("cabinet", 0)
+    drawers = {p.name: p for p in asset.parts if kind_of(p) == "drawer"}
+    middle = PartChoice(("drawer",), "middle")
+    for names, expected in (
+        (("top_drawer", "bottom_drawer"), "top_drawer"),
+        (("bottom_drawer",), "bottom_drawer"),
+    ):
+        piece = replace(asset, parts=tuple(drawers[name] for name in names))
+        with pytest.raises(InputError, match="no middle drawer"):
+            possible_parts(piece, middle, hollow=True)
+        (part,) = possible_parts(piece, replace(middle, any_layout=True), hollow=True)
+        assert part.name == expected
+        own = EnvConfig("articulated/open_middle_drawer", objects=(piece,))
+        scenes = SceneSource(named_task(own.task), own)
+        assert [[spec.part for spec in group] for group in scenes.strata()] == [[expected]]
 
 
 def test_a_part_that_is_not_there_is_refused_with_those_that_are():

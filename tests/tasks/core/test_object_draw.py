@@ -109,18 +109,32 @@ def test_an_episode_is_about_the_object_furniture_and_part_asked_for():
     environment.reset(asked)  # and nothing is lost
 
 
-def test_a_scene_is_swapped_in_half_a_second_and_kept():
-    environment = load(*TARGET_POSE, seed=0, obs_mode="state", objects=[*MUGS, "box_000"])
-    environment.reset(EpisodeSpec(0, object="box_000"))
+def test_a_scene_is_swapped_in_a_third_of_a_second_and_kept():
+    """CPU time; `benchmarks/experiments/scene_swaps.py` prints a median of 0.1 s over twelve categories."""
+    environment = load(*TARGET_POSE, seed=0, obs_mode="state")
+    first, *others = few("/".join(TARGET_POSE))
+    environment.reset(EpisodeSpec(0, object=first))
     task = environment.task
     times = []
-    for name in MUGS:
+    for name in others:
         start = time.process_time()
         environment.reset(EpisodeSpec(0, object=name))
         times.append(time.process_time() - start)
-    assert min(times) < 0.5
-    environment.reset(EpisodeSpec(0, object="box_000"))
+    assert np.median(times) < 0.3
+    environment.reset(EpisodeSpec(0, object=first))
     assert environment.task is task
+
+
+def test_furniture_is_swapped_in_half_a_second():
+    """The first scene with a piece also finds where it can stand; that is done once."""
+    times = []
+    for _ in range(2):
+        environment = load("articulated", "open_microwave", seed=0, obs_mode="state")
+        for name in few("articulated/open_microwave"):
+            start = time.process_time()
+            environment.reset(EpisodeSpec(0, furniture=name))
+            times.append(time.process_time() - start)
+    assert np.median(times) < 0.5
 
 
 def test_the_control_mode_stays_when_the_scene_changes():
