@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.tasks.articulated.furniture import FurnitureInQuestion
@@ -14,9 +15,11 @@ from manipose_mj.tasks.articulated.furniture_task import FurnitureTask
 from manipose_mj.tasks.articulated.placement import Standing
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
 from manipose_mj.tasks.core.preview import Preview
-from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start import EpisodeStart, NoStartError
 from manipose_mj.tasks.goals import Goal, OpenGoal, ShutGoal
 from manipose_mj.tasks.observations.frames import BodyFrame
+
+_MOVED = 0.1  # of its range, by which a part that moved before the start is not where it was drawn
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,21 @@ class OpenClose(FurnitureTask):
         self.pieces = FurnitureInQuestion(
             self.scene, (furniture,), (part,), self.task_config.standing
         )
+
+    def write(self, physics: mjcf.Physics, start: EpisodeStart) -> None:
+        """Put a simulation where an episode starts.
+
+        Raises:
+          NoStartError: The part does not stay as it was drawn: the hand at home is in its way.
+        """
+        super().write(physics, start)
+        part, (now,) = self.part, self.pieces.opening(physics, self._piece)
+        low, high = part.joint.range
+        drawn = start.furniture[0].openings.get(part.name, low)
+        if abs(now - drawn) > _MOVED * (high - low):
+            raise NoStartError(
+                f"{part.name} of {self.furniture.asset.name} moves from {drawn:.2f} to {now:.2f} before the episode starts"
+            )
 
     @property
     def extra_frames(self) -> Mapping[str, BodyFrame]:

@@ -13,13 +13,15 @@ from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation import protocol
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import compose, invert, transform
 from manipose_mj.tasks.articulated.cavity_placement import resting, ways_to_lie
+from manipose_mj.tasks.articulated.open_close import OpenClose
 from manipose_mj.tasks.articulated.part_choice import PartChoice, kind_of, possible_parts
 from manipose_mj.tasks.articulated.part_room import outwards_of, room_at
 from manipose_mj.tasks.articulated.registered import OPENABLES
-from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import named_task
 from manipose_mj.tasks.core.scene_source import SceneSource
 from manipose_mj.tasks.core.start import NoStartError
@@ -278,3 +280,15 @@ def test_a_start_in_which_no_hand_gets_at_the_object_is_none():
     objects = {**task.start.objects, "object": replace(placed, pose=cavity @ at)}
     with pytest.raises(NoStartError, match="no hand gets at it"):
         task.write(physics, replace(task.start, objects=objects))
+
+
+def test_a_part_that_the_hand_at_home_pushes_shut_is_drawn_again():
+    frozen = protocol.load("v1").episode("articulated/close_middle_drawer", 15)
+    env = suite.load("articulated", "close_middle_drawer", split="test", obs_mode="state")
+    env.reset(EpisodeSpec(**frozen.asked))
+    task = env.task
+    assert isinstance(task, OpenClose) and not task.succeeded(env.physics)
+    low, high = task.part.joint.range
+    (now,) = task.pieces.opening(env.physics, 0)
+    assert abs(now - task.start.furniture[0].openings[task.part.name]) < 0.1 * (high - low)
+    assert now > low + 0.5 * (high - low)
