@@ -23,8 +23,8 @@ from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 PROBED = 8  # starts
 MARGIN = 1.5  # of what the probe saw
-# On top of that: a hand that touches what no probed hand has touched.
-MORE_CONTACTS, MORE_CONSTRAINTS = 8, 32
+# On top of that: a hand that closes on what no probed hand closed on.
+MORE_CONTACTS, MORE_CONSTRAINTS = 16, 96
 # Control steps: to above the object, down onto it, closing, lifting; then to joint angles drawn at random.
 _PHASES = (30, 35, 15, 20)
 _DRAWN_TARGETS, _HELD = 4, 25
@@ -156,12 +156,21 @@ class _Counter:
 
     def count(self, row: int, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
         near = near_pairs(model, data, self._pairs[self._scenes[row]])
-        return max(data.ncon, near), data.nefc
+        # Of the physics steps in between MuJoCo remembers the most contacts, and not their rows.
+        rows = data.nefc + (data.maxuse_con - data.ncon) * _rows_of_a_contact(model)
+        return max(data.maxuse_con, near), rows
 
     def spread(self, count: int) -> Int[np.ndarray, " count"]:
         """So many starts, from the one with the fewest to the one with the most."""
         order = np.argsort(self.begun[:, 0], kind="stable")
         return order[np.linspace(0, len(order) - 1, count).round().astype(int)]
+
+
+def _rows_of_a_contact(model: mujoco.MjModel) -> int:
+    """The most that one can have."""
+    dimensions = int(model.geom_condim.max())
+    pyramid = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    return max(2 * (dimensions - 1), 1) if pyramid else dimensions
 
 
 def near_pairs(
