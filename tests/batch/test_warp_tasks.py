@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch, suite
-from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import WARP_ON_CPU
 from manipose_mj.tasks.core.config import EnvConfig
@@ -29,11 +28,9 @@ def on_any_device(monkeypatch):
 def stepped(pool, engine: batch.making.EngineName) -> batch.State:
     worlds = batch.from_pool(pool, len(SEEDS), engine)
     state = worlds.at(SEEDS)
-    middle = np.tile((worlds.lower + worlds.upper) / 2, (len(SEEDS), 1)).astype(np.float32)
     joints = np.concatenate([state.measurement.joints, np.full((len(SEEDS), 1), 0.04)], axis=1)
-    own = pool.layout.control_mode == "pd_joint_pos"
     for _ in range(STEPS):
-        state = worlds.step(state, joints.astype(np.float32) if own else middle)
+        state = worlds.step(state, joints.astype(np.float32))
     worlds.close()
     return jax.tree.map(np.asarray, state)
 
@@ -66,8 +63,3 @@ def test_randomised_worlds_run(task):
 
 def test_late_servo_targets_run():
     assert_as_on_the_cpu("single_object/position", latency=0.03)
-
-
-@pytest.mark.parametrize("mode", CONTROL_MODES)
-def test_every_control_mode_runs(mode):
-    assert_as_on_the_cpu("single_object/position", control_mode=mode)
