@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 from manipose_mj.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from manipose_mj.batch.capacity import Capacity
     from manipose_mj.batch.making import from_pool, make
     from manipose_mj.batch.starts import StartPool
     from manipose_mj.batch.worlds import State, Transition, Worlds
 
-__all__ = ["StartPool", "State", "Transition", "Worlds", "from_pool", "make"]
+__all__ = ["Capacity", "StartPool", "State", "Transition", "Worlds", "from_pool", "make"]
 
 __getattr__ = lazy_exports(__name__, __file__)

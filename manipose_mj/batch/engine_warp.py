@@ -1,6 +1,7 @@
 """The engine `warp`: MuJoCo Warp called from JAX, one captured graph a control step."""
 
 from dataclasses import fields, is_dataclass
+from math import ceil
 from typing import Any
 
 import jax
@@ -13,9 +14,10 @@ from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch import warp_kernels as kernels
+from manipose_mj.batch.capacity import Capacity, probe
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.render_warp import WarpRenderer
-from manipose_mj.batch.row_fields import Capacity, RowFields
+from manipose_mj.batch.row_fields import RowFields
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
@@ -32,7 +34,10 @@ _READ = ("xpos", "xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "actu
 
 
 class WarpEngine:
-    """All worlds in one `mujoco_warp.Data`, which is scratch: states are arguments and results."""
+    """All worlds in one `mujoco_warp.Data`, which is scratch: states are arguments and results.
+
+    Attributes: capacity: room for contacts and constraints.
+    """
 
     name = "warp"
 
@@ -49,7 +54,7 @@ class WarpEngine:
         Args:
           pool: Of starts.
           worlds: How many there are.
-          capacity: Room for contacts and constraints; None: estimated from the starts.
+          capacity: Room for contacts and constraints; None: from a `probe` of the pool.
           visual: Whether cameras shall see the objects and furniture of several scenes.
 
         Raises:
@@ -59,7 +64,7 @@ class WarpEngine:
         self._fields = RowFields(pool, visual=visual)
         self._visual = visual or len(pool.scenes) == 1
         model = self._fields.model
-        self.capacity = capacity = capacity or self._fields.capacity(worlds)
+        self.capacity = capacity or probe(pool).capacity(worlds)
         self._device = wp.device_from_jax(jax.devices()[0])
         with wp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)
@@ -78,9 +83,11 @@ class WarpEngine:
     def _made(self, model: mujoco.MjModel, worlds: int) -> Any:
         """Data of so many worlds, each with its share of the room."""
         room = self.capacity
-        contacts = -(-room.contacts * worlds // self._worlds)
         return mujoco_warp.make_data(
-            model, nworld=worlds, naconmax=contacts, njmax=room.constraints
+            model,
+            nworld=worlds,
+            naconmax=ceil(room.contacts * worlds),
+            njmax=room.constraints,
         )
 
     def _require_room(self, model: mujoco.MjModel) -> None:

@@ -10,8 +10,8 @@ from typing import Literal, Unpack
 
 import jax
 
+from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.engine import Engine
 from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
@@ -35,6 +35,7 @@ def make(
     engine: EngineName = "auto",
     processes: int = 1,
     visual: bool = False,
+    capacity: Capacity | None = None,
     **config: Unpack[EnvOptions],
 ) -> Worlds:
     """Many worlds of a registered task.
@@ -49,6 +50,7 @@ def make(
         `"auto"`, the latter where it is.
       processes: Of the engine `c`.
       visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
+      capacity: Room of the engine `warp` for contacts and constraints; without it, from a probe of the starts.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
         `objects`, `split`, `randomisation`, `sensors`, `latency`.
 
@@ -60,7 +62,7 @@ def make(
     require_worlds(worlds)
     chosen = available_engine(engine)
     pool = draw_pool(EnvConfig(task, **config), list(seeds))
-    return from_pool(pool, worlds, chosen, processes=processes, visual=visual)
+    return from_pool(pool, worlds, chosen, processes=processes, visual=visual, capacity=capacity)
 
 
 def from_pool(
@@ -70,6 +72,7 @@ def from_pool(
     *,
     processes: int = 1,
     visual: bool = False,
+    capacity: Capacity | None = None,
 ) -> Worlds:
     """Many worlds whose starts are drawn already, or were saved in a file; arguments as of `make`.
 
@@ -80,7 +83,11 @@ def from_pool(
     chosen = available_engine(engine)
     if isinstance(pool, Path):
         pool = StartPool.load(pool)
-    return Worlds(pool, _engine(chosen, pool, worlds, processes, visual), worlds)
+    if chosen == "warp":
+        from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
+
+        return Worlds(pool, WarpEngine(pool, worlds, capacity, visual=visual), worlds)
+    return Worlds(pool, CEngine(pool, worlds, processes=processes), worlds)
 
 
 def require_worlds(worlds: int) -> None:
@@ -111,11 +118,3 @@ def missing_for_warp() -> str:
     if jax.default_backend() != "gpu" and not os.environ.get(WARP_ON_CPU):
         return 'JAX sees no NVIDIA GPU; on a machine with one, pip install "manipose-mj[gpu]"'
     return ""
-
-
-def _engine(name: str, pool: StartPool, worlds: int, processes: int, visual: bool) -> Engine:
-    if name == "warp":
-        from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
-
-        return WarpEngine(pool, worlds, visual=visual)
-    return CEngine(pool, worlds, processes=processes)

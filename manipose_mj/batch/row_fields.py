@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 from jaxtyping import Int
 
-from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.row_models import RowModels, awake
 from manipose_mj.batch.slot_bodies import ScenePlaces
 from manipose_mj.batch.slot_model import SlotModel, slot_model
 from manipose_mj.batch.starts import StartPool
@@ -53,19 +52,6 @@ _FIELDS = (
 _UNUSED = {"jnt_range": (-1.0, 1.0), "dof_frictionloss": 0.0, "body_gravcomp": 1.0}
 # MuJoCo Warp places geoms that cannot move once, not in every world anew.
 _STATIC = ("geom_xpos", "geom_xmat")
-# Contacts and constraint rows that may come to those of a start: a hand that touches several objects.
-_MORE_CONTACTS, _MORE_ROWS = 24, 192
-
-
-@dataclass(frozen=True)
-class Capacity:
-    """Room on the device.
-
-    Attributes: contacts: of all worlds together; constraints: rows of each world.
-    """
-
-    contacts: int
-    constraints: int
 
 
 class RowFields:
@@ -92,15 +78,14 @@ class RowFields:
           InputError: The pool's scenes differ in more than objects and furniture.
         """
         slots, models = slot_model(pool, visual=visual), RowModels(pool)
-        self.model, self.geoms = _awake(slots.model), slots.geoms
+        self.model, self.geoms = awake(slots.model), slots.geoms
         fields: dict[str, list[np.ndarray]] = {}
         found: dict[str, list[np.ndarray]] = {name: [] for name in (*_STATIC, *_STATES)}
-        owners, sizes = [], []
+        owners = []
         for row, start in enumerate(pool.starts):
-            model = _awake(models.at(row))
+            model = awake(models.at(row))
             data = mujoco.MjData(model)
             write_simulation(model, data, unflatten(model, data, start.simulation))
-            sizes.append((data.ncon, data.nefc))
             geoms, places = slots.geoms[start.scene], slots.places[start.scene]
             of_scene = {"body": places.bodies, "jnt": places.joints, "dof": places.dofs}
             of_scene["geom"] = geoms
@@ -137,13 +122,6 @@ class RowFields:
             self.addresses["openings"].append(places.placed("angles", at.openings))
             self.addresses["cameras"].append(at.cameras)
         self.addresses = {name: np.stack(values) for name, values in self.addresses.items()}
-        self._sizes = np.array(sizes)
-
-    def capacity(self, worlds: int) -> Capacity:
-        """Room for twice what the starts need, and a hand that touches several objects."""
-        contacts = 2 * float(self._sizes[:, 0].mean()) + _MORE_CONTACTS
-        rows = 2 * int(self._sizes[:, 1].max()) + _MORE_ROWS
-        return Capacity(int(contacts * worlds), rows)
 
     def to_device(self, model: Any, data: Any, worlds: int) -> list[tuple[Any, Any]]:
         """Give every world fields of its own in a model of MuJoCo Warp.
@@ -211,13 +189,6 @@ def _require_robot_first(servos: ServoAddresses, places: ScenePlaces) -> None:
     for name, ids in (("angles", servos.angles), ("angles", servos.fingers), ("dofs", servos.dofs)):
         ids = np.arange(ids.start, ids.stop)
         assert np.array_equal(places.placed(name, ids), ids), "the robot does not come first"
-
-
-def _awake(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A copy in which nothing sleeps."""
-    copied = mujoco.MjModel.__copy__(model)
-    copied.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    return copied
 
 
 def _in_one_column(table: np.ndarray, own: Any, worlds: int) -> tuple[Any, Any]:

@@ -24,3 +24,10 @@ class RowModels:
                 getattr(known, name)[:] = values
             self._models[row] = known
         return known
+
+
+def awake(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy in which nothing sleeps."""
+    copied = mujoco.MjModel.__copy__(model)
+    copied.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    return copied

@@ -88,6 +88,10 @@ class Simulator:
         stacked = Measurement(*(np.stack(field) for field in zip(*measured, strict=True)))
         return states, diverged, stacked
 
+    def held(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The model and data of a world that has made a step and did not diverge in it."""
+        return self._worlds[world].model, self._worlds[world].data
+
     def _step(self, worlds: list[_World], targets: Float[np.ndarray, "worlds substeps 8"]) -> None:
         """The physics steps of some worlds, side by side: NumPy is quicker with all of them at once."""
         servos = [world.servos for world in worlds]

@@ -1,0 +1,84 @@
+"""How much room a probe says contacts take: nothing is left out, and it is not guessed from the starts alone."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from manipose_mj.batch import Capacity
+from manipose_mj.batch.capacity import Peaks, near_pairs, probe, touching_pairs
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.row_models import RowModels
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
+
+
+@pytest.fixture(scope="module")
+def boxes():
+    return draw_pool(EnvConfig("single_object/target_pose", objects=("box_000",)), range(3))
+
+
+@pytest.fixture(scope="module")
+def peaks(boxes):
+    return probe(boxes)
+
+
+def at_start(pool, row: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = RowModels(pool).at(row)
+    data = mujoco.MjData(model)
+    write_simulation(model, data, unflatten(model, data, pool.starts[row].simulation))
+    return model, data
+
+
+def test_the_same_pool_has_the_same_peaks(boxes, peaks):
+    again = probe(boxes)
+    np.testing.assert_array_equal(again.contacts, peaks.contacts)
+    np.testing.assert_array_equal(again.constraints, peaks.constraints)
+
+
+def test_hands_touch_what_they_do_not_at_the_start(boxes, peaks):
+    first = [at_start(boxes, row)[1] for row in range(len(boxes.starts))]
+    assert peaks.contacts.min() > max(data.ncon for data in first)
+    # Four contacts of a box with the table have 16 rows; those with pads have some too.
+    assert peaks.constraints.min() >= max(data.nefc for data in first) + 4
+
+
+def test_a_moment_between_control_steps_counts():
+    """A mug that is tipped touches the table with many of its convex parts for an instant."""
+    mugs = draw_pool(EnvConfig("single_object/target_pose", objects=("mug_000",)), range(1, 2))
+    peaks, (_, data) = probe(mugs), at_start(mugs, 0)
+    assert peaks.contacts[0] > 2 * data.ncon + 24
+    assert peaks.constraints[0] > 2 * data.nefc + 192
+
+
+def test_one_world_can_be_the_worst_and_many_are_as_the_average():
+    peaks = Peaks(np.array([10, 10, 10, 90]), np.array([40, 40, 40, 400]))
+    assert peaks.capacity(1) == Capacity(1.5 * 90 + 16, 696)
+    many = peaks.capacity(10_000)
+    assert 1.5 * 30 + 16 < many.contacts < 1.5 * 31 + 16
+    assert many.constraints == 696  # rows are not shared
+
+
+def test_room_for_nothing_is_refused():
+    with pytest.raises(InputError, match="contacts is 0"):
+        Capacity(0, 100)
+    with pytest.raises(InputError, match="constraints is -1"):
+        Capacity(10, -1)
+
+
+def test_all_that_touches_is_a_pair_that_can_and_near(boxes):
+    model, data = at_start(boxes, 0)
+    allowed, rng, seen = touching_pairs(model), np.random.default_rng(0), 0
+    for _ in range(40):
+        data.qpos[:] = model.qpos0
+        data.qpos[:9] += rng.normal(0, 0.6, 9)
+        data.qpos[-7:-4] = rng.uniform([0.2, -0.3, 0.0], [0.7, 0.3, 0.3])
+        data.qpos[-4:] = rng.normal(size=4)
+        mujoco.mj_forward(model, data)
+        touching = {tuple(sorted(pair)) for pair in data.contact.geom.tolist()}
+        assert touching <= {tuple(sorted(pair)) for pair in allowed.tolist()}
+        assert near_pairs(model, data, allowed) >= len(touching)
+        seen += len(touching)
+    assert seen > 40
