@@ -16,6 +16,7 @@ import multiprocessing
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -139,6 +140,7 @@ def run(case: Case) -> Row:
 
 def config_for(asset: Asset, part: MovingPart, verb: str) -> EnvConfig:
     """The environment in which a part with a handle is opened or shut, whatever furniture it is of."""
+    _register_tasks()
     task = f"furniture/{verb}_{kind_of(part)}"
     return EnvConfig(task, obs_mode="state", objects=(str(asset.folder),))
 
@@ -186,10 +188,13 @@ def _moving(requested: Literal["open", "shut"]) -> DrawnTaskFactory:
     return factory
 
 
-for _kind in ("drawer", "door", "flap"):
-    _draws = furniture_alone(RequestedFurniture(_FURNITURE, PartChoice((_kind,))))
-    register_task("furniture", f"open_{_kind}", draws=_draws)(_moving("open"))
-    register_task("furniture", f"close_{_kind}", draws=_draws)(_moving("shut"))
+@cache
+def _register_tasks() -> None:
+    """Make the tasks known; not where this is imported only, since every list of tasks would have them too."""
+    for kind in ("drawer", "door", "flap"):
+        draws = furniture_alone(RequestedFurniture(_FURNITURE, PartChoice((kind,))))
+        register_task("furniture", f"open_{kind}", draws=draws)(_moving("open"))
+        register_task("furniture", f"close_{kind}", draws=draws)(_moving("shut"))
 
 
 def assets_in(folder: Path | None) -> Iterator[tuple[Path | None, Asset]]:
