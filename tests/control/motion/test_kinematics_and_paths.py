@@ -281,6 +281,24 @@ def test_a_line_that_the_arm_cannot_follow_is_refused(scene, arm):
     assert track(arm, HOME, poses, TIMESTEP) is None
 
 
+def test_a_line_asked_for_again_has_the_same_bits_and_where_something_moved_is_another(scene, arm):
+    arm.follow(scene, HOME)
+    start = tcp_pose(HOME)
+    up = compose(np.eye(3), np.array([0.0, 0.0, 0.05])) @ start
+    poses = line_poses(start, up, TIMESTEP, LineConfig())
+    arm.tracks.clear()
+    first = track(arm, HOME, poses, TIMESTEP)
+    kept = first.copy()
+    first[:] = 0.0  # nobody's changes come back
+    assert (track(arm, HOME, poses, TIMESTEP) == kept).all() and len(arm.tracks) == 1
+    arm.tracks.clear()
+    assert (track(arm, HOME, poses, TIMESTEP) == kept).all()
+    arm.model.body("cabinet/middle_drawer").pos[:] += 0.01
+    track(arm, HOME, poses, TIMESTEP)
+    assert len(arm.tracks) == 2
+    arm.follow(scene, HOME)
+
+
 def test_the_motion_planner_finds_free_joint_targets(scene, arm, tcp_at):
     planner = MotionPlanner(scene, arm, TIMESTEP, np.random.default_rng(0))
     goal = tcp_at((0.35, -0.1, 0.25))
