@@ -35,7 +35,7 @@ def record_targets(task: str, protocol: str, episodes: int, hz: int) -> dict[int
     found = {}
     for number in range(episodes):
         tape = TapedBaseline()
-        naming = Naming(task, number, tape.pose_source)
+        naming = Naming(task, number, tape.pose_source, tape.mask_source)
         spec = config.episode_spec(task, number)
         result, _ = play(environment, tape, spec, Rules(), naming)
         targets = slowed(np.array(tape.taken)[: result.steps], hz).astype(np.float32)

@@ -11,8 +11,6 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-from manipose_mj.demos.attempts import TapedBaseline
-from manipose_mj.demos.playback import slowed
 from manipose_mj.demos.replay import SteppedPolicy
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
@@ -26,13 +24,18 @@ TASK = "single_object/target_pose"
 NEW = {"lerobot_new_rollout": True}
 
 
-@pytest.fixture(scope="module")
-def environment_class():
-    file = ROOT / "plugins/lerobot_env_manipose/lerobot_env_manipose/environment.py"
-    spec = importlib.util.spec_from_file_location("lerobot_environment", file)
+def plugin_module(file: str):
+    """One of the plug-in's, which need not be installed."""
+    path = ROOT / "plugins/lerobot_env_manipose" / file
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.LeRobotEnv
+    return module
+
+
+@pytest.fixture(scope="module")
+def environment_class():
+    return plugin_module("lerobot_env_manipose/environment.py").LeRobotEnv
 
 
 @pytest.fixture(scope="module")
@@ -108,14 +111,13 @@ def test_its_success_is_that_of_our_evaluation(environment_class):
     """The same targets, at 10 Hz, in the first frozen episodes of both."""
     frozen = list(protocol.load("v1").task(TASK).episodes.values())[:3]
     plain = EnvConfig(TASK, obs_mode="state", split="test")
+    recorded = plugin_module("frozen_targets.py").record_targets(TASK, "v1", 3, 10)
+    assert list(recorded) == [episode.seed for episode in frozen]
     ours, theirs = [], []
     there = environment_class(TASK, protocol="v1", obs_mode="state+pose")
     for number, episode in enumerate(frozen):
-        spec = EpisodeSpec(**episode.asked)
-        tape, here = TapedBaseline(), environment_of(plain)
-        play(here, tape, spec, Rules(), Naming(TASK, number, "oracle", "none"))
-        targets = slowed(np.array(tape.taken), 10.0)
-        rules = Rules(10.0, stop="success")
+        spec, here = EpisodeSpec(**episode.asked), environment_of(plain)
+        targets, rules = recorded[episode.seed], Rules(10.0, stop="success")
         result, _ = play(
             here, SteppedPolicy(targets), spec, rules, Naming(TASK, number, "none", "none")
         )
@@ -131,10 +133,7 @@ def test_its_success_is_that_of_our_evaluation(environment_class):
 
 
 def test_frozen_targets_are_played_one_by_one_and_the_last_is_held(tmp_path):
-    file = ROOT / "plugins/lerobot_env_manipose/frozen_targets.py"
-    spec = importlib.util.spec_from_file_location("frozen_targets", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = plugin_module("frozen_targets.py")
     targets = {7: np.arange(16, dtype=np.float32).reshape(2, 8), 3: np.ones((1, 8), np.float32)}
     module.write_targets(tmp_path / "new" / "targets.npz", targets)
     policy = module.FrozenTargets(str(tmp_path / "new" / "targets.npz"))
