@@ -84,7 +84,10 @@ class Candidates:
                 return self._usable(candidate)
             except InputError as error:
                 refusal = error
-        raise refusal or InputError(f"there are no objects besides {', '.join(without)}")
+                if all(self._refusals.get(name) for name in self._by_name):
+                    break
+        said = refusal or f"there are no objects besides {', '.join(without)}"
+        raise InputError(str(said)) from None
 
     def usable(self) -> dict[str, tuple[str, ...]]:
         """The names of those that can be used, by category; loads all."""
@@ -102,7 +105,7 @@ class Candidates:
         known = candidate.name in self._refusals
         refusal = self._refusals.get(candidate.name)
         if refusal is not None:
-            raise refusal
+            raise InputError(str(refusal))  # one raised again and again would keep every traceback
         asset = candidate.load()
         if not known:
             try:

@@ -68,6 +68,20 @@ def test_what_cannot_be_used_is_drawn_again_and_told_where_nothing_can():
         Candidates(pool[:2], no_mugs).draw(rng)
 
 
+def test_a_refusal_is_one_line_with_a_short_traceback_and_every_object_is_looked_at_once():
+    asset, looked = catalogue.load_by_name("box_000"), []
+
+    def never(asset):
+        looked.append(asset.name)
+        raise InputError(f"{asset.name}: never")
+
+    candidates = Candidates([Candidate("box_000", "box", lambda: asset)], never)
+    for _ in range(3):
+        with pytest.raises(InputError, match="box_000: never") as caught:
+            candidates.draw(np.random.RandomState(0))
+    assert looked == ["box_000"] and len(caught.traceback) < 5
+
+
 def test_instances_differ_from_episode_to_episode_and_observations_keep_their_shape():
     environment = load(*TARGET_POSE, seed=0, obs_mode="state+pose+segmentation")
     spec = environment.observation_spec()
