@@ -174,6 +174,7 @@ def test_evaluations_take_every_piece_of_furniture_with_all_its_parts(name):
 
 
 @pytest.mark.full
+@pytest.mark.timeout(900)  # 56 objects are built where none was before
 def test_objects_of_every_category_can_be_played():
     pool = builtin("test", rigid_rows())
     firsts = {candidate.category: candidate.name for candidate in reversed(pool)}
