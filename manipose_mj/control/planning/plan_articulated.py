@@ -33,6 +33,7 @@ OPEN_SHARE = 0.95
 OPEN_ENOUGH = 0.85
 AJAR = 0.3  # from which on a door can be pushed from inside [rad]
 SHUT_ENOUGH = 0.005  # of a joint [m or rad]
+_LEFT_OVER = (0.7, 0.4, 0.85)  # of a door's opening, by the first of two pushes
 # From which openings on a part that is estimated stands otherwise than it should: of its range, [m or rad].
 NOT_OPEN, NOT_SHUT = 0.08, {"slide": 0.012, "hinge": 0.05}
 CAVITY_MARGIN = np.array([0.010, 0.010, 0.004])  # in all, along each axis [m]
@@ -78,6 +79,11 @@ def part_goal_plans(
         yield (Step("move_to", goal.part, opening=low),)
         # What no push shuts is led by its handle, and then pushed on from where the hand can lead it no further.
         yield (*_led(goal.part, low), Step("move_to", goal.part, opening=low))
+        # A door that no single push shuts is pushed twice, in other places; how far it will be open has to be known.
+        known = part.joint.kind == "hinge" and goal.part not in opened
+        for share in _LEFT_OVER if known else ():
+            between = low + share * (part.opening - low)
+            yield tuple(Step("move_to", goal.part, opening=each) for each in (between, low))
     elif isinstance(goal, OpenGoal):
         share = max(OPEN_SHARE, min((1 + goal.fraction) / 2, 1.0))
         is_open = part.opening >= low + goal.fraction * (high - low)
