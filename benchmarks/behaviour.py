@@ -5,7 +5,7 @@
 
 A record holds, for every task, the results and trajectories of a few episodes of the baseline with true
 poses; for every task again, a few random steps with every observation mode, dense reward and strong
-randomisation; the same steps in every control mode; an episode on estimated poses; and the pose estimates
+randomisation; those of the first task in every control mode; an episode on estimated poses; and the pose estimates
 of two categories. Floats are kept as hashes of their bytes. Times are left out.
 """
 
