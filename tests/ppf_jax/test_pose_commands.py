@@ -34,6 +34,7 @@ CUP, BOWL = (
         (["pose", "train", "mug", "--setting", "anywere"], "did you mean anywhere"),
         (["pose", "train", "mug", "--setting"], "--setting names none"),
         (["pose", "train", "axial", "--part-swaps", "-1"], "--part-swaps is -1"),
+        (["pose", "train", "mug", "--asset-views", "0"], "--asset-views is 0"),
         (["pose", "train", "mug", "--part-swaps", "2"], "objects are made of two of mug"),
         (["pose", "train", "axial", "--part-swaps", "2", "--labels", "original"], "no source has"),
         (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),

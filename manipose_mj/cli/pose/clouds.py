@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Literal
+
+import joblib
 
 from manipose_mj.assets.categories import CATALOGUE, Split
 from manipose_mj.console import output
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.ppf_jax.data.asset_views import chosen_assets, views_of
 from manipose_mj.ppf_jax.data.part_swap_clouds import part_swap_clouds
 from manipose_mj.ppf_jax.data.source_frames import SourceLabel, with_source_frames
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
 from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
+
+log = logging.getLogger(__name__)
 
 
 class PoseClouds:
@@ -39,6 +47,7 @@ class PoseClouds:
           InputError: There is no such category or type, or nothing is left.
         """
         known = categories_of(name)
+        self._name = name
         for category in leave_out:
             if category not in known:
                 raise unknown_name(f"category of {name}", category, known)
@@ -93,6 +102,50 @@ class PoseClouds:
                 jobs=self._jobs,
                 progress=progress.update,
             )
+
+    def of_assets(
+        self, directories: Sequence[Path], setting: str, views: int, known: CommonSymmetry
+    ) -> list[LabelledCloud]:
+        """Views of the built assets of these categories, or of the type, in folders.
+
+        What has less symmetry than the catalogue's objects share is left out with a warning, for no network that
+        assumes it can learn it.
+
+        Args:
+          directories: Of asset folders.
+          setting: From where, and how well.
+          views: Of each asset.
+          known: What the catalogue's objects share.
+
+        Raises:
+          InputError: They are wanted with the sources' labels, a folder has no asset of the category or type, one
+            cannot be read, or none has the symmetry.
+        """
+        if not directories:
+            return []
+        if self._labels == "original":
+            raise InputError(
+                "--assets have unified labels only; leave out --labels original or --assets"
+            )
+        chosen = view_setting(setting)
+        found = [a for folder in directories for a in chosen_assets(folder, self._name)]
+        fitting = [asset for asset in found if known.holds(asset.label.symmetry)]
+        for asset in found:
+            if asset not in fitting:
+                log.warning("%s: less symmetric than what is trained, left out", asset.folder)
+        if not fitting:
+            raise InputError(
+                f"{directories[0]}: no asset has the symmetry of the catalogue's {self._name} objects"
+            )
+        work = joblib.Parallel(n_jobs=self._jobs, return_as="generator")(
+            joblib.delayed(views_of)(asset, chosen, views) for asset in fitting
+        )
+        clouds: list[LabelledCloud] = []
+        with output.Progress("assets rendered") as progress:
+            for done, (asset, some) in enumerate(zip(fitting, work, strict=True), 1):
+                clouds += some  # pyright: ignore[reportOperatorIssue]
+                progress.update(done, len(fitting), asset.name)
+        return clouds
 
     def sources(self, clouds: Sequence[LabelledCloud]) -> dict[str, SourceLabel]:
         """The sources' labels of the objects that clouds show."""

@@ -28,6 +28,8 @@ def train_pose(
     setting: Annotated[tuple[str, ...], arg(metavar="NAME...")] = ("training",),
     views: int = 256,
     part_swaps: int = 0,
+    assets: Annotated[tuple[Path, ...], arg(metavar="DIR...")] = (),
+    asset_views: int = 96,
     batch: int = 64,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -53,6 +55,9 @@ def train_pose(
       views: Of each object in each setting.
       part_swaps: Of a type, so many objects besides that are made of two of different categories, 32 views
         each in the setting training.
+      assets: Folders of built assets, such as your scans, that are trained on besides: those of the category or
+        type.
+      asset_views: Of each of these assets in each setting.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -62,7 +67,7 @@ def train_pose(
     """
     one_thread_per_process()
     compile_at_once_on_gpus()
-    require_positive(minutes, views=views, batch=batch, steps=steps)
+    require_positive(minutes, views=views, **{"asset-views": asset_views}, batch=batch, steps=steps)
     if part_swaps < 0:
         raise InputError(f"--part-swaps is {part_swaps}; expected 0 or more")
     if not setting:
@@ -70,6 +75,7 @@ def train_pose(
     from manipose_mj.cli.pose.clouds import PoseClouds
     from manipose_mj.console import output
     from manipose_mj.ppf_jax.data.view_cache import batch_stream
+    from manipose_mj.ppf_jax.points.symmetry import common_symmetry
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, train
     from manipose_mj.ppf_jax.training.methods import METHODS
@@ -79,6 +85,9 @@ def train_pose(
     made_of_two = source.part_swapped(part_swaps)
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     clouds += made_of_two
+    known = common_symmetry(cloud.symmetry for cloud in clouds)
+    for each in setting:
+        clouds += source.of_assets(assets, each, asset_views, known)
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)
