@@ -14,6 +14,7 @@ from manipose_mj.assets.asset import Asset, Provenance
 from manipose_mj.cli.pose.clouds import PoseClouds
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.data.view_cache import VIEWS_PER_FILE
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry, common_symmetry
 
 AXIAL = CommonSymmetry(axial=True)
@@ -45,24 +46,56 @@ def folder(tmp_path_factory):
     return directory
 
 
+def names(clouds):
+    return {cloud.name.split("/")[0] for cloud in clouds}
+
+
 def test_assets_of_a_type_join_where_they_are_as_symmetric_as_the_catalogue_s(folder, caplog):
+    source = PoseClouds("axial")
     with caplog.at_level(logging.WARNING):
-        clouds = PoseClouds("axial").of_assets([folder], "training", 3, AXIAL)
+        assets = source.fitting_assets([folder], AXIAL)
+    clouds = source.of_assets(assets, "anywhere", 3)
     assert [cloud.name for cloud in clouds] == [f"round/{i}" for i in range(3)]
     assert "bent: less symmetric than what is trained, left out" in caplog.text
     assert common_symmetry(cloud.symmetry for cloud in clouds).axial
 
 
 def test_all_join_where_nothing_is_assumed(folder):
-    clouds = PoseClouds("cup").of_assets([folder], "training", 2, CommonSymmetry())
-    assert {cloud.name.split("/")[0] for cloud in clouds} == {"round", "bent"}
-    assert PoseClouds("cup").of_assets([], "training", 2, CommonSymmetry()) == []
+    source = PoseClouds("cup")
+    assets = source.fitting_assets([folder], CommonSymmetry())
+    assert names(source.of_assets(assets, "anywhere", 2)) == {"round", "bent"}
+    assert source.fitting_assets([], CommonSymmetry()) == ()
+
+
+def test_training_tapers_assets_as_it_tapers_the_catalogue(folder):
+    source = PoseClouds("cup")
+    (asset,) = (a for a in source.fitting_assets([folder], CommonSymmetry()) if a.name == "round")
+    as_it_is = source.of_assets([asset], "anywhere", 1)
+    drawn = source.of_assets([asset], "training", VIEWS_PER_FILE + 1)
+    extents = {tuple(cloud.extents) for cloud in drawn}
+    assert len(extents) == 2
+    assert tuple(as_it_is[0].extents) not in extents
+    # It is as high as it was.
+    assert {x for x, *_ in extents} == {as_it_is[0].extents[0]}
+
+
+def test_objects_are_made_of_an_asset_and_another(folder):
+    source = PoseClouds("cup")
+    assets = source.fitting_assets([folder], CommonSymmetry())
+    clouds = source.part_swapped_assets(assets, 2)
+    assert names(clouds) == {"asset_part_swap_00000", "asset_part_swap_00001"}
+    assert len(clouds) == 2 * VIEWS_PER_FILE
+    again = source.part_swapped_assets(assets, 1)
+    np.testing.assert_array_equal(again[0].points, clouds[0].points)
+    assert source.part_swapped_assets(assets, 0) == []
+    with pytest.raises(InputError, match="name some with --assets"):
+        source.part_swapped_assets((), 1)
 
 
 def test_what_cannot_be_trained_is_named(folder, tmp_path):
     with pytest.raises(InputError, match="no rigid asset of category or type 'mirror'"):
-        PoseClouds("mirror").of_assets([folder], "training", 2, CommonSymmetry())
+        PoseClouds("mirror").fitting_assets([folder], CommonSymmetry())
     with pytest.raises(InputError, match="no asset has the symmetry of the catalogue's functional"):
-        PoseClouds("functional").of_assets([folder], "training", 2, AXIAL)
+        PoseClouds("functional").fitting_assets([folder], AXIAL)
     with pytest.raises(InputError, match="leave out --labels original or --assets"):
-        PoseClouds("cup", labels="original").of_assets([folder], "training", 2, AXIAL)
+        PoseClouds("cup", labels="original").fitting_assets([folder], AXIAL)

@@ -20,6 +20,9 @@ def train_articulated(
     scenes: int = 16,
     further: int = 0,
     synthetic: int = 0,
+    assets: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    only: Annotated[tuple[str, ...], arg(metavar="ASSET...", help_behavior_hint="")] = (),
+    asset_scenes: int = 48,
     batch: int = 32,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -37,6 +40,9 @@ def train_articulated(
       scenes: Of each object; a scene has openings of its own and four views.
       further: Objects of each category beyond the built-in ones, to learn from more of them.
       synthetic: Pieces of synthetic furniture to learn from besides: wardrobes, dressers, desks, large appliances.
+      assets: Folder of built furniture, such as PartNet-Mobility's, that is trained on besides.
+      only: Of these assets; by default all that have a part with a handle.
+      asset_scenes: Of each of them.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -45,7 +51,10 @@ def train_articulated(
       jobs: Processes that render, and beside a GPU make the batches.
     """
     one_thread_per_process()
-    require_positive(minutes, scenes=scenes, batch=batch, steps=steps)
+    counts = {"asset-scenes": asset_scenes}
+    require_positive(minutes, scenes=scenes, batch=batch, steps=steps, **counts)
+    if only and assets is None:
+        raise InputError("--only names built furniture; say with --assets where it is")
     for name, count in (("further", further), ("synthetic", synthetic)):
         if count < 0:
             raise InputError(f"--{name} is {count}; expected 0 or more")
@@ -53,6 +62,7 @@ def train_articulated(
 
     from manipose_mj.console import output
     from manipose_mj.ppf_jax.articulated.model import ArticulatedConfig, ArticulatedModel
+    from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes as scenes_of_assets
     from manipose_mj.ppf_jax.data.articulated.cache import (
         SCENES_PER_FILE,
         furniture_names,
@@ -79,10 +89,17 @@ def train_articulated(
     # Confidence is about clouds as they come, not as training keeps them.
     few = objects[:: max(1, len(objects) * SCENES_PER_FILE // _CALIBRATION)]
     calibration = furniture_scenes(few, "front", scenes=SCENES_PER_FILE, jobs=jobs)
-    feed = furniture_stream(known, batch, seed)
+    built = []
+    if assets is not None:
+        wanted = only or None
+        built = scenes_of_assets(assets, "training", scenes=asset_scenes, jobs=jobs, only=wanted)
+        calibration += scenes_of_assets(
+            assets, "front", scenes=SCENES_PER_FILE, jobs=jobs, only=wanted
+        )
+    feed = furniture_stream([*known, *built], batch, seed)
     if jobs > 1 and jax.default_backend() != "cpu":
         feed = parallel_furniture_stream(
-            objects, "training", scenes=scenes, batch=batch, seed=seed, jobs=jobs
+            objects, "training", scenes=scenes, batch=batch, seed=seed, jobs=jobs, others=built
         )
     with output.Progress("steps") as progress:
 
@@ -103,7 +120,7 @@ def train_articulated(
     save_weights(out / WEIGHTS_FILE, TrainedModel(model, CATEGORIES))  # pyright: ignore[reportArgumentType]
     draw_curve(out / CURVE_FILE, out / CURVE_PICTURE)
     output.standard_output().print(
-        f"trained on {len(known)} scenes; {out / WEIGHTS_FILE}", soft_wrap=True
+        f"trained on {len(known) + len(built)} scenes; {out / WEIGHTS_FILE}", soft_wrap=True
     )
     return evaluate_articulated(weights=out / WEIGHTS_FILE, jobs=jobs)
 

@@ -9,11 +9,12 @@ from typing import Literal
 
 import joblib
 
+from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import CATALOGUE, Split
 from manipose_mj.console import output
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.ppf_jax.data.asset_views import chosen_assets, views_of
-from manipose_mj.ppf_jax.data.part_swap_clouds import part_swap_clouds
+from manipose_mj.ppf_jax.data.asset_views import asset_whole, chosen_assets, views_of
+from manipose_mj.ppf_jax.data.part_swap_clouds import asset_part_swap_clouds, part_swap_clouds
 from manipose_mj.ppf_jax.data.source_frames import SourceLabel, with_source_frames
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
 from manipose_mj.ppf_jax.data.view_settings import view_setting
@@ -103,18 +104,16 @@ class PoseClouds:
                 progress=progress.update,
             )
 
-    def of_assets(
-        self, directories: Sequence[Path], setting: str, views: int, known: CommonSymmetry
-    ) -> list[LabelledCloud]:
-        """Views of the built assets of these categories, or of the type, in folders.
+    def fitting_assets(
+        self, directories: Sequence[Path], known: CommonSymmetry
+    ) -> tuple[Asset, ...]:
+        """The built assets of these categories, or of the type, in folders.
 
         What has less symmetry than the catalogue's objects share is left out with a warning, for no network that
         assumes it can learn it.
 
         Args:
           directories: Of asset folders.
-          setting: From where, and how well.
-          views: Of each asset.
           known: What the catalogue's objects share.
 
         Raises:
@@ -122,14 +121,13 @@ class PoseClouds:
             cannot be read, or none has the symmetry.
         """
         if not directories:
-            return []
+            return ()
         if self._labels == "original":
             raise InputError(
                 "--assets have unified labels only; leave out --labels original or --assets"
             )
-        chosen = view_setting(setting)
         found = [a for folder in directories for a in chosen_assets(folder, self._name)]
-        fitting = [asset for asset in found if known.holds(asset.label.symmetry)]
+        fitting = tuple(asset for asset in found if known.holds(asset.label.symmetry))
         for asset in found:
             if asset not in fitting:
                 log.warning("%s: less symmetric than what is trained, left out", asset.folder)
@@ -137,15 +135,44 @@ class PoseClouds:
             raise InputError(
                 f"{directories[0]}: no asset has the symmetry of the catalogue's {self._name} objects"
             )
+        return fitting
+
+    def of_assets(self, assets: Sequence[Asset], setting: str, views: int) -> list[LabelledCloud]:
+        """`views` views of each of some built assets.
+
+        Raises:
+          InputError: One cannot be read, or not be seen in this setting.
+        """
+        chosen = view_setting(setting)
         work = joblib.Parallel(n_jobs=self._jobs, return_as="generator")(
-            joblib.delayed(views_of)(asset, chosen, views) for asset in fitting
+            joblib.delayed(views_of)(asset, chosen, views) for asset in assets
         )
         clouds: list[LabelledCloud] = []
         with output.Progress("assets rendered") as progress:
-            for done, (asset, some) in enumerate(zip(fitting, work, strict=True), 1):
+            for done, (asset, some) in enumerate(zip(assets, work, strict=True), 1):
                 clouds += some  # pyright: ignore[reportOperatorIssue]
-                progress.update(done, len(fitting), asset.name)
+                progress.update(done, len(assets), asset.name)
         return clouds
+
+    def part_swapped_assets(self, assets: Sequence[Asset], count: int) -> list[LabelledCloud]:
+        """Views of objects that are made of an asset and another object, as training sees them.
+
+        Raises:
+          InputError: There is no asset, or none whose ends can be told apart.
+        """
+        if not count:
+            return []
+        if not assets:
+            raise InputError("--asset-part-swaps makes objects of assets; name some with --assets")
+        with output.Progress("part-swapped assets rendered") as progress:
+            return asset_part_swap_clouds(
+                [asset_whole(asset) for asset in assets],
+                self.categories,
+                count,
+                view_setting("training"),
+                jobs=self._jobs,
+                progress=progress.update,
+            )
 
     def sources(self, clouds: Sequence[LabelledCloud]) -> dict[str, SourceLabel]:
         """The sources' labels of the objects that clouds show."""

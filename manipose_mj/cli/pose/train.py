@@ -30,6 +30,7 @@ def train_pose(
     part_swaps: int = 0,
     assets: Annotated[tuple[Path, ...], arg(metavar="DIR...")] = (),
     asset_views: int = 96,
+    asset_part_swaps: int = 0,
     batch: int = 64,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -58,6 +59,8 @@ def train_pose(
       assets: Folders of built assets, such as your scans, that are trained on besides: those of the category or
         type.
       asset_views: Of each of these assets in each setting.
+      asset_part_swaps: So many objects besides that are made of one of these assets and another of them or a
+        training object, 32 views each in the setting training.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -68,8 +71,9 @@ def train_pose(
     one_thread_per_process()
     compile_at_once_on_gpus()
     require_positive(minutes, views=views, **{"asset-views": asset_views}, batch=batch, steps=steps)
-    if part_swaps < 0:
-        raise InputError(f"--part-swaps is {part_swaps}; expected 0 or more")
+    for option, count in (("part-swaps", part_swaps), ("asset-part-swaps", asset_part_swaps)):
+        if count < 0:
+            raise InputError(f"--{option} is {count}; expected 0 or more")
     if not setting:
         raise InputError("--setting names none; expected at least one, such as training")
     from manipose_mj.cli.pose.clouds import PoseClouds
@@ -86,8 +90,10 @@ def train_pose(
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     clouds += made_of_two
     known = common_symmetry(cloud.symmetry for cloud in clouds)
+    scans = source.fitting_assets(assets, known)
     for each in setting:
-        clouds += source.of_assets(assets, each, asset_views, known)
+        clouds += source.of_assets(scans, each, asset_views)
+    clouds += source.part_swapped_assets(scans, asset_part_swaps)
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)

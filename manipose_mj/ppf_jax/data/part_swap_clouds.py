@@ -23,7 +23,7 @@ from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.storage.cache_root import cache_root
 from manipose_mj.storage.source_hash import source_hash
 
-CATEGORY = "part_swap"  # of the clouds; of no catalogue
+CATEGORY, ASSET_CATEGORY = "part_swap", "asset_part_swap"  # of the clouds; of no catalogue
 _SEED = 0x2E250DD2  # another number would make other objects than estimators were trained on
 _DRAWS = 200  # of two objects, most of which go together
 
@@ -69,6 +69,72 @@ def part_swap_clouds(
             progress(done, count, str(name))
     files = [_file(donors, number, setting) for number in range(count)]
     return [cloud for path in files for cloud in read_clouds(path, path.stem, CATEGORY)]
+
+
+def asset_part_swap_clouds(
+    wholes: Sequence[Whole],
+    categories: Sequence[str],
+    count: int,
+    setting: ViewSetting,
+    *,
+    jobs: int = 1,
+    progress: Report | None = None,
+) -> list[LabelledCloud]:
+    """`VIEWS_PER_FILE` views of each of `count` objects made of an asset and another asset or training object.
+
+    Either may be the lower one. Nothing is kept in the cache.
+
+    Args:
+      wholes: Of the assets, of one type.
+      categories: Of the catalogue and of the same type.
+      count: How many objects.
+      setting: From where, and how well; none on a table.
+      jobs: Processes.
+      progress: Told of every finished object.
+
+    Raises:
+      InputError: No asset has ends that can be told apart, hardly any two objects go together, or a setting needs
+        resting poses.
+    """
+    assets = [whole for whole in wholes if part_swappable(whole.label)]
+    donors = tuple(sorted(c for c in categories if part_swappable(catalogue.generate(c, 0).label)))
+    if not assets:
+        raise InputError("objects are made of two; the assets' ends cannot be told apart")
+    if setting.placement != "anywhere":
+        raise InputError(
+            f"setting {setting.name!r} needs resting poses, which objects made of two lack"
+        )
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
+        joblib.delayed(_asset_part_swap)(assets, donors, number, setting) for number in range(count)
+    )
+    clouds: list[LabelledCloud] = []
+    for done, some in enumerate(work, 1):
+        clouds += some  # pyright: ignore[reportOperatorIssue]
+        if progress is not None:
+            progress(done, count, f"{ASSET_CATEGORY}_{done:05d}")
+    return clouds
+
+
+def _asset_part_swap(
+    assets: Sequence[Whole], donors: Sequence[str], number: int, setting: ViewSetting
+) -> list[LabelledCloud]:
+    rng = np.random.default_rng([_SEED, 1, number])
+    for _ in range(_DRAWS):
+        one = assets[int(rng.integers(len(assets)))]
+        if donors and rng.random() < 0.5:
+            other = _training_object(donors[int(rng.integers(len(donors)))], rng)
+        else:
+            other = assets[int(rng.integers(len(assets)))]
+        if other is one or not part_swappable(other.label):
+            continue
+        pair = (one, other) if rng.random() < 0.5 else (other, one)
+        found = part_swapped(*pair, rng)
+        if found is not None:
+            name = f"{ASSET_CATEGORY}_{number:05d}"
+            subject = Subject.of_mesh(found.mesh, found.label, name=name, category=ASSET_CATEGORY)
+            occluders = catalogue_occluders(number) if setting.occluded else []
+            return render_clouds(subject, setting, VIEWS_PER_FILE, rng, occluders=occluders)
+    raise InputError(f"of {_DRAWS} pairs of {len(assets)} assets and others none goes together")
 
 
 def part_swap_subject(donors: Sequence[str], number: int) -> Subject:

@@ -16,6 +16,7 @@ from functools import cache
 from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import joblib
 import numpy as np
@@ -149,6 +150,7 @@ def parallel_furniture_stream(
     batch: int,
     seed: int,
     jobs: int,
+    others: Sequence[FurnitureScene] = (),
 ) -> Callable[[int], Iterator[FurnitureBatch]]:
     """The batches of `furniture_stream`, made ahead by other processes: a GPU takes them faster than one can.
 
@@ -159,20 +161,25 @@ def parallel_furniture_stream(
       batch: Clouds in a batch.
       seed: Of the clouds and their points.
       jobs: Processes.
+      others: Scenes to draw from besides, after those of the objects.
     """
 
     def batches(start: int) -> Iterator[FurnitureBatch]:
-        workers = ProcessPoolExecutor(
-            jobs, get_context("spawn"), _keep_scenes, (tuple(objects), setting, scenes)
-        )
-        try:
-            ahead: deque[Future[FurnitureBatch]] = deque()
-            for step in itertools.count(start):
-                ahead.append(workers.submit(_batch_of_kept, batch, seed, step))
-                if len(ahead) > 3 * jobs:
-                    yield ahead.popleft().result()
-        finally:
-            workers.shutdown(wait=False, cancel_futures=True)
+        with TemporaryDirectory(prefix="manipose-scenes-") as scratch:
+            # Read by every process, once; a pipe to each would carry gigabytes.
+            kept = Path(scratch) / "others.pickle"
+            kept.write_bytes(pickle.dumps(list(others)))
+            workers = ProcessPoolExecutor(
+                jobs, get_context("spawn"), _keep_scenes, (tuple(objects), setting, scenes, kept)
+            )
+            try:
+                ahead: deque[Future[FurnitureBatch]] = deque()
+                for step in itertools.count(start):
+                    ahead.append(workers.submit(_batch_of_kept, batch, seed, step))
+                    if len(ahead) > 3 * jobs:
+                        yield ahead.popleft().result()
+            finally:
+                workers.shutdown(wait=False, cancel_futures=True)
 
     return batches
 
@@ -180,8 +187,11 @@ def parallel_furniture_stream(
 _kept: list[FurnitureScene] = []  # of a process that makes batches
 
 
-def _keep_scenes(objects: Sequence[tuple[str, int]], setting: str, scenes: int) -> None:
+def _keep_scenes(
+    objects: Sequence[tuple[str, int]], setting: str, scenes: int, others: Path
+) -> None:
     _kept[:] = [scene for each in objects for scene in _read(*each, setting, scenes)]
+    _kept.extend(pickle.loads(others.read_bytes()))  # written by the process that started this one
 
 
 def _batch_of_kept(batch: int, seed: int, step: int) -> FurnitureBatch:
