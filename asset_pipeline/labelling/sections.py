@@ -122,8 +122,8 @@ def joint(
     towards = np.sign(after - logs[:, start - window : start].mean(axis=1))
     departure = (towards[:, None] * (logs - level[:, None])).sum(axis=0)
     departed = departure > limit
-    begin = start - window
-    while begin < start + window and not departed[begin : begin + 3].all():
+    begin, end = start - window, min(start + window, SLICES - 3)
+    while begin < end and not departed[begin : begin + 3].all():
         begin += 1
     pitch = float(sections.place[1] - sections.place[0])
     back = 0.5

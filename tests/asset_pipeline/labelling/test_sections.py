@@ -32,3 +32,18 @@ def test_similar_tools_of_any_size_have_the_joint_at_the_same_share(largest, ste
     shares = np.array([place for place, _ in found]) / [0.06, 0.12, 0.20, 0.40]
     assert np.ptp(shares) < 1e-6
     assert np.ptp([size for _, size in found]) < 1e-6
+
+
+def test_a_tool_that_changes_up_to_its_end_has_a_joint():
+    """Ridges at the far end alone: none is three sections wide, so nothing has departed before the tool ends."""
+    ridged = np.where((SHARES > 0.95) & (np.arange(SLICES) % 3 == 0), 0.06, 0.02)
+    place, size = joint(
+        Sections(SHARES, ridged, np.full(SLICES, 0.1), 0 * SHARES),
+        thickness_only=True,
+        largest=True,
+        step=0.1,
+        begun=0.25,
+        reach=(0.28, 1.0),
+    )
+    assert 0.9 < place < 1.0
+    assert size > 0.1
