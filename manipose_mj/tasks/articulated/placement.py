@@ -25,6 +25,7 @@ from manipose_mj.tasks.core.start import Mount
 _SHIFT, _TURN = 0.006, radians(1)
 _UP = np.array([0.0, 0.0, 1.0])
 _BATCH, _BATCHES = 64, 8  # candidates
+_MORE_BATCHES = 48  # where these have too few good places
 _KEPT = 24
 _ENOUGH = 8  # good places on the table, or the piece stands elsewhere
 _HALF = LAYERS // 2
@@ -145,7 +146,10 @@ class _Key:
 
 @lru_cache(maxsize=1024)
 def _good_places(key: _Key, layer: int, standing: Standing) -> tuple[tuple[Place, ...], float]:
-    """The best of the places that are drawn for a part, and the best score; on the table where there are enough."""
+    """The best of the places that are drawn for a part, and the best score; on the table where there are enough.
+
+    Where there are few, more are drawn; those from where the arm cannot move the part all the way count only if all are such.
+    """
     shape = part_shape(key.asset, key.part)
     objects = None
     if standing.objects:
@@ -155,15 +159,33 @@ def _good_places(key: _Key, layer: int, standing: Standing) -> tuple[tuple[Place
     for on_table in (True, False) if fits_table(shape) else (False,):
         rng = np.random.RandomState(0)
         for _ in range(_BATCHES):
-            drawn = [_drawn(rng, key.part, shape, standing, on_table) for _ in range(_BATCH)]
-            best += zip(_scores(score, shape, drawn).tolist(), drawn, strict=True)
+            best += _scored(rng, score, standing, on_table)
             if sum(value >= 1.0 for value, _ in best) >= _KEPT:
                 break
         best.sort(key=lambda found: -found[0])
-        if best[_ENOUGH - 1][0] >= COMPLETE:
+        if _enough(best):
             break
+    for _ in range(_MORE_BATCHES):
+        if best[0][0] < COMPLETE or _enough(best):
+            break
+        best += _scored(rng, score, standing, False)
+    best.sort(key=lambda found: -found[0])
     least = min(best[0][0] - _SPREAD, best[_ENOUGH - 1][0])
+    if best[0][0] >= COMPLETE:
+        least = max(least, COMPLETE)
     return tuple(place for value, place in best[:_KEPT] if value >= least), best[0][0]
+
+
+def _enough(found: list[tuple[float, Place]]) -> bool:
+    return sum(value >= COMPLETE for value, _ in found) >= _ENOUGH
+
+
+def _scored(
+    rng: np.random.RandomState, score: PlaceScore, standing: Standing, on_table: bool
+) -> list[tuple[float, Place]]:
+    """A batch of candidates, each with its score."""
+    drawn = [_drawn(rng, score.part, score.shape, standing, on_table) for _ in range(_BATCH)]
+    return list(zip(_scores(score, score.shape, drawn).tolist(), drawn, strict=True))
 
 
 def _drawn(
