@@ -18,10 +18,9 @@ from manipose_mj.control.grasping.part_pick import (
     ending_free,
     is_a_stage,
     leads_enough,
-    off_surface,
-    push_part,
     way_in_hand,
 )
+from manipose_mj.control.grasping.part_push import off_surface, push_part
 from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.grasping.retraction import (
     Place,
@@ -51,6 +50,7 @@ _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
+_STAGES = 6  # the same, where each may lead it less far than all the way
 _IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
@@ -76,6 +76,10 @@ class Primitives:
 
     The planner that a primitive takes says what to assume; it plans in the scene of every new
     observation. Raises `StageFailure` where a step cannot be done.
+
+    Attributes:
+      in_stages: Whether parts may be pushed several times, each as far as a push leads, and knobs are held deeper: a
+        last resort.
     """
 
     def __init__(self, executor: Executor) -> None:
@@ -85,6 +89,7 @@ class Primitives:
         self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
         self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
+        self.in_stages = False
 
     @property
     def held(self) -> str | None:
@@ -101,7 +106,8 @@ class Primitives:
         estimate, planner = self._observe(planner)
         if name in estimate.parts:
             opening = None if destination is None else destination.opening
-            pick = pick_part(planner, estimate, estimate.parts[name], opening)
+            part = estimate.parts[name]
+            pick = pick_part(planner, estimate, part, opening, in_stages=self.in_stages)
         else:
             poses = () if destination is None else destination.poses
             slipped = self._slipped.get(name, ())
@@ -236,7 +242,7 @@ class Primitives:
         """
         part = self._executor.observe().parts[name]
         span = float(np.ptp(part.joint.range))
-        for _ in range(_PUSHES):
+        for _ in range(_STAGES if self.in_stages else _PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
                 return
             yield from self._push_once(planner, name, opening)
@@ -252,14 +258,16 @@ class Primitives:
         part = estimate.parts[name]
         beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
         aim = opening - beyond if opening <= part.joint.range[0] else opening
-        push = push_part(planner, estimate, part, aim, self._in_vain.get(name, ()))
+        in_vain = self._in_vain.get(name, ())
+        push = push_part(planner, estimate, part, aim, in_vain, in_stages=self.in_stages)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
         self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
         gone = abs(estimate.parts[name].opening - part.opening)
-        if gone < _IN_VAIN * abs(opening - part.opening) and isinstance(push.way.hold, Push):
+        meant = min(abs(opening - part.opening), abs(push.way.openings[-1] - part.opening))
+        if gone < _IN_VAIN * meant and isinstance(push.way.hold, Push):
             self._in_vain.setdefault(name, []).append(push.way.hold)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:

@@ -80,7 +80,7 @@ def test_fingertips_hold_a_bar_by_its_front(scene):
     _, _, part = scene
     front = part.handle.origin + part.handle.rotation[:, 1] * part.handle.extents[1] / 2
     usual = [_before(hold, part, front) for hold in grips(part)]
-    tips = [_before(hold, part, front) for hold in grips(part, fingertips=True)]
+    tips = [_before(hold, part, front) for hold in grips(part, "fingertips")]
     assert tips and min(tips) > max(usual)
     # The pads still overlap the bar.
     assert min(tips) > 0.0 and max(tips) < 0.004
