@@ -14,11 +14,21 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.mjcf.arena import SIDE_TABLE_CENTER, TABLE_CENTER, TABLE_HALF_EXTENTS
+from manipose_mj.mjcf.arena import (
+    SIDE_TABLE_CENTER,
+    SIDE_TABLE_HALF_EXTENTS,
+    TABLE_CENTER,
+    TABLE_HALF_EXTENTS,
+)
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.articulated.part_choice import kind_of
 from manipose_mj.tasks.articulated.part_shape import PartShape, part_shape
-from manipose_mj.tasks.articulated.place_score import COMPLETE, LAYERS, PlaceScore
+from manipose_mj.tasks.articulated.place_score import (
+    COMPLETE,
+    LAYERS,
+    TRAVEL,
+    PlaceScore,
+)
 from manipose_mj.tasks.core.start import Mount
 
 # A place that was found good is so nearby too [m, rad].
@@ -40,6 +50,11 @@ _PEDESTAL = 0.05  # height of the lowest [m]
 _OBJECTS = np.array(
     [(x, y, z) for x in (-0.15, 0.0, 0.15) for y in (-0.15, 0.0, 0.15) for z in (0.05, 0.2)]
 )
+# Points all over the side table, from the middle of its top, and how near nothing may come to them [m].
+_SIDE_TABLE = SIDE_TABLE_HALF_EXTENTS * np.array(
+    [(x, y, -1.0) for x in np.linspace(-1, 1, 7) for y in np.linspace(-1, 1, 7)]
+)
+_SIDE_TABLE_RADIUS = 0.06
 
 
 @dataclass(frozen=True)
@@ -106,7 +121,7 @@ def widest_start(asset: Asset, part: MovingPart, standing: Standing | None = Non
     All of it, but for doors that fold back so far that the arm cannot get before them anywhere.
     """
     _, best = _good_places(_Key(asset, part), LAYERS - 1, standing or Standing())
-    return 1.0 if best >= COMPLETE else _HALF / (LAYERS - 1)
+    return 1.0 if best >= COMPLETE else TRAVEL * _HALF / (LAYERS - 1)
 
 
 def _layer(fraction: float) -> int:
@@ -222,7 +237,12 @@ def _scores(score: PlaceScore, shape: PartShape, places: list[Place]) -> Float[n
     bases = np.stack([compose(rotation_about(_UP, p.yaw), p.position) for p in places])
     floors = np.array([0.0 if p.mount.table else -p.mount.height for p in places])
     on_table = np.array([p.mount.table for p in places])
-    return np.where(~on_table | _stands(shape, bases), score(bases, floors), -1.0)
+    stands = ~on_table | _stands(shape, bases)
+    beside = np.array([p.mount.side_table for p in places])
+    for sign in set(beside[beside != 0]):
+        table = _SIDE_TABLE + np.array(SIDE_TABLE_CENTER) * [1.0, sign, 1.0]
+        stands &= (beside != sign) | score.stays_off(bases, table, _SIDE_TABLE_RADIUS)
+    return np.where(stands, score(bases, floors), -1.0)
 
 
 def _stands(shape: PartShape, bases: Float[np.ndarray, "c 4 4"]) -> Bool[np.ndarray, "c"]:
