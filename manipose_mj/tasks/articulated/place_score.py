@@ -70,6 +70,7 @@ class PlaceScore:
       layer: Of `LAYERS` openings the one at which the part starts, to be shut; 0: to be opened.
       back: Whether it is to be shut again after it was opened.
       objects: `(n, 3)`, where objects may be, in the base frame [m]; the part stays off there.
+      fingertips: Whether the handle is held by its front only, for which there is more room.
     """
 
     part: MovingPart
@@ -77,6 +78,7 @@ class PlaceScore:
     layer: int = 0
     back: bool = False
     objects: Float[np.ndarray, "n 3"] | None = None
+    fingertips: bool = False
 
     def __call__(
         self, bases: Float[np.ndarray, "c 4 4"], floors: Float[np.ndarray, "c"]
@@ -105,7 +107,7 @@ class PlaceScore:
     def _opening(self, around: _Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Share of the travel, and of the hand's poses there, as the handle leads; then from inside."""
         led, ease = np.zeros(len(around.bases)), np.zeros(len(around.bases))
-        for grip in around_the_bar(self.part):
+        for grip in around_the_bar(self.part, fingertips=self.fingertips):
             way = chained(around.free(grip), _STEPS, seed=around.approached(grip))
             led = np.maximum(led, _share(way))
             ease = np.maximum(ease, way.mean(axis=(1, 2)))

@@ -161,15 +161,33 @@ class _Key:
 
 @lru_cache(maxsize=1024)
 def _good_places(key: _Key, layer: int, standing: Standing) -> tuple[tuple[Place, ...], float]:
-    """The best of the places that are drawn for a part, and the best score; on the table where there are enough.
+    """The best of the places that are drawn for a part, and the best score.
 
-    Where there are few, more are drawn; those from where the arm cannot move the part all the way count only if all are such.
+    Those from where the arm cannot move the part all the way count only if all are such, all around the robot and for
+    a hand that holds the handle by its fingertips too.
     """
+    found = _found(key, layer, standing)
+    around = Standing(objects=standing.objects)
+    for fingertips in (False, True):
+        if found[0][0] < COMPLETE and (fingertips or standing != around):
+            again = _found(key, layer, around, fingertips=fingertips)
+            found = max(found, again, key=lambda places: places[0][0])
+    best = found[0][0]
+    least = min(best - _SPREAD, found[_ENOUGH - 1][0])
+    if best >= COMPLETE:
+        least = max(least, COMPLETE)
+    return tuple(place for value, place in found[:_KEPT] if value >= least), best
+
+
+def _found(
+    key: _Key, layer: int, standing: Standing, *, fingertips: bool = False
+) -> list[tuple[float, Place]]:
+    """Candidates with their scores, the best first; on the table where there are enough, more where there are few."""
     shape = part_shape(key.asset, key.part)
     objects = None
     if standing.objects:
         objects = _OBJECTS + np.array(SIDE_TABLE_CENTER) * [1.0, -side(key.part), 1.0]
-    score = PlaceScore(key.part, shape, layer, standing.objects, objects)
+    score = PlaceScore(key.part, shape, layer, standing.objects, objects, fingertips)
     best: list[tuple[float, Place]] = []
     for on_table in (True, False) if fits_table(shape) else (False,):
         rng = np.random.RandomState(0)
@@ -179,16 +197,13 @@ def _good_places(key: _Key, layer: int, standing: Standing) -> tuple[tuple[Place
                 break
         best.sort(key=lambda found: -found[0])
         if _enough(best):
-            break
-    for _ in range(_MORE_BATCHES):
-        if best[0][0] < COMPLETE or _enough(best):
-            break
+            return best
+    for _ in range(_MORE_BATCHES if best[0][0] >= COMPLETE else 0):
         best += _scored(rng, score, standing, False)
+        if _enough(best):
+            break
     best.sort(key=lambda found: -found[0])
-    least = min(best[0][0] - _SPREAD, best[_ENOUGH - 1][0])
-    if best[0][0] >= COMPLETE:
-        least = max(least, COMPLETE)
-    return tuple(place for value, place in best[:_KEPT] if value >= least), best[0][0]
+    return best
 
 
 def _enough(found: list[tuple[float, Place]]) -> bool:
