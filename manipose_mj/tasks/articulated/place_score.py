@@ -26,7 +26,7 @@ from manipose_mj.tasks.articulated.hand_places import (
     chained,
     on_the_front,
 )
-from manipose_mj.tasks.articulated.part_shape import PartShape, part_motion
+from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN, PartShape, part_motion
 
 LAYERS = 10  # openings looked at
 COMPLETE = (
@@ -68,7 +68,7 @@ class PlaceScore:
       part: Has a handle.
       shape: Where it is.
       layer: Of `LAYERS` openings the one at which the part starts, to be shut; 0: to be opened.
-      back: Whether it is to be shut again after it was opened.
+      back: Whether it is to be shut again after it was opened so far that a hand can reach in.
       objects: `(n, 3)`, where objects may be, in the base frame [m]; the part stays off there.
       fingertips: Whether the handle is held by its front only, for which there is more room.
     """
@@ -113,7 +113,7 @@ class PlaceScore:
             ease = np.maximum(ease, way.mean(axis=(1, 2)))
         value = led.copy()
         if self.part.joint.kind == "hinge":
-            ajar_share = min(_AJAR / (TRAVEL * np.ptp(self.part.joint.range)), 1.0)
+            ajar_share = min(_AJAR / self._travel(), 1.0)
             for hold in behind_the_door(self.part, self.shape):
                 ajar = np.flatnonzero((value < COMPLETE) & (led >= ajar_share))
                 if not len(ajar):
@@ -150,10 +150,15 @@ class PlaceScore:
         """
         return self._clear_of(invert(bases), points, radius, self._motions())
 
+    def _travel(self) -> float:
+        """Of the joint [m or rad]."""
+        travel = TRAVEL * float(np.ptp(self.part.joint.range))
+        reached_into = self.back and self.part.joint.kind == "hinge"
+        return min(travel, WIDE_OPEN) if reached_into else travel
+
     def _motions(self) -> Float[np.ndarray, "k 4 4"]:
         """Of the part, at each opening looked at."""
-        low, high = self.part.joint.range
-        openings = low + TRAVEL * (high - low) * np.linspace(0, 1, LAYERS)
+        openings = self.part.joint.range[0] + self._travel() * np.linspace(0, 1, LAYERS)
         return np.stack([part_motion(self.part, float(q)) for q in openings])
 
     def _robot_clear(self, bases: np.ndarray, motions: np.ndarray) -> Bool[np.ndarray, "c"]:
