@@ -32,9 +32,10 @@ from manipose_mj.control.grasping.retraction import (
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
+from manipose_mj.control.planning.plan_articulated import AJAR
 from manipose_mj.control.scene.cavity_mouth import way_out
 from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
-from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
 from manipose_mj.poses import invert
@@ -78,8 +79,8 @@ class Primitives:
     observation. Raises `StageFailure` where a step cannot be done.
 
     Attributes:
-      in_stages: Whether parts may be pushed several times, each as far as a push leads, and knobs are held deeper: a
-        last resort.
+      in_stages: Whether parts may be pushed several times, each as far as a push leads, also where no grip comes first
+        or the hand slipped off, and knobs are held deeper: a last resort.
     """
 
     def __init__(self, executor: Executor) -> None:
@@ -90,6 +91,9 @@ class Primitives:
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
         self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
         self.in_stages = False
+        self._ungripped: str | None = (
+            None  # a part that is pushed on though the plan has it led by its handle
+        )
 
     @property
     def held(self) -> str | None:
@@ -107,7 +111,13 @@ class Primitives:
         if name in estimate.parts:
             opening = None if destination is None else destination.opening
             part = estimate.parts[name]
-            pick = pick_part(planner, estimate, part, opening, in_stages=self.in_stages)
+            try:
+                pick = pick_part(planner, estimate, part, opening, in_stages=self.in_stages)
+            except StageFailure:
+                if not self.in_stages or not _can_be_pushed_on(part, opening):
+                    raise
+                self._ungripped = name
+                return
         else:
             poses = () if destination is None else destination.poses
             slipped = self._slipped.get(name, ())
@@ -138,6 +148,9 @@ class Primitives:
     def release(self, planner: MotionPlanner, name: str) -> Actions:
         """Let go and back off along the approach."""
         held, self._held = self._held, None
+        ungripped, self._ungripped = self._ungripped, None
+        if held is None and name == ungripped:
+            return
         if held is None:
             raise StageFailure("plan", f"release {name} while nothing is held")
         if not isinstance(held.pick, PartPick):
@@ -225,6 +238,9 @@ class Primitives:
         yield from self._executor.follow(way.targets(self._executor.timestep))
         moved = self._executor.observe().parts[part.name].opening
         low, high = part.joint.range
+        now = replace(part, opening=moved)
+        if self.in_stages and _can_be_pushed_on(now, step.opening):
+            return
         if abs(moved - way.openings[-1]) > _OPENING_TOLERANCE * (high - low):
             raise StageFailure(
                 "motion",
@@ -322,6 +338,12 @@ class Primitives:
                 "grasp", f"lost hold of {name}: it moved {moved * 100:.1f} cm in the hand"
             )
         return now
+
+
+def _can_be_pushed_on(part: PartEstimate, opening: float | None) -> bool:
+    """Whether it is a door, wide enough open to be pushed open further from inside."""
+    ajar = part.joint.kind == "hinge" and part.opening > part.joint.range[0] + AJAR
+    return ajar and opening is not None and opening > part.opening
 
 
 def retraction_of(
