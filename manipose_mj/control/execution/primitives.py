@@ -91,9 +91,10 @@ class Primitives:
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
         self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
         self.in_stages = False
-        self._ungripped: str | None = (
-            None  # a part that is pushed on though the plan has it led by its handle
-        )
+        # Of parts: where the hand last led each by its handle from, and where to [m or rad].
+        self._led: dict[str, tuple[float, float]] = {}
+        # A part that is pushed on though the plan has it led by its handle.
+        self._ungripped: str | None = None
 
     @property
     def held(self) -> str | None:
@@ -224,6 +225,7 @@ class Primitives:
         assert step.opening is not None and self._held is not None
         estimate, planner = self._observe(planner)
         part = estimate.parts[step.subject]
+        self._led[part.name] = (part.opening, step.opening)
         self._check_held(estimate, step.subject)
         if self._executor.feels_joints:
             yield from lead_part(self._executor, planner, step.subject, step.opening)
@@ -261,12 +263,19 @@ class Primitives:
         for _ in range(_STAGES if self.in_stages else _PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
                 return
+            if self.in_stages and self._led_beyond(part, opening):
+                return
             yield from self._push_once(planner, name, opening)
             part = self._executor.observe().parts[name]
         if abs(part.opening - opening) > _OPENING_TOLERANCE * span:
             raise StageFailure(
                 "motion", f"{name} is at {part.opening:.3f}, should be at {opening:.3f}"
             )
+
+    def _led_beyond(self, part: PartEstimate, opening: float) -> bool:
+        """Whether the hand has led a part there and on: it need not come back."""
+        start, end = self._led.get(part.name, (opening, opening))
+        return end == opening and (part.opening - opening) * (opening - start) > 0
 
     def _push_once(self, planner: MotionPlanner, name: str, opening: float) -> Actions:
         yield from self._executor.close()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.grasping.handle_grasps import Depth, grip_now, grips
+from manipose_mj.control.grasping.handle_grasps import GripKind, grip_now, grips
 from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -25,9 +25,9 @@ _AJAR = 0.5  # of a door, enough to reach behind it [rad]
 _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
 _MAX_TRIES = 12  # ways for which an approach is looked for
-# How deep a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
-_DEPTHS: tuple[Depth, ...] = ("usual", "fingertips")
-_DEPTHS_IN_STAGES: tuple[Depth, ...] = ("deep", *_DEPTHS)
+# How a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
+_KINDS: tuple[GripKind, ...] = ("usual", "fingertips")
+_KINDS_IN_STAGES: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def grip_handle(
       estimate: What is where.
       part: What to take.
       opening: Where it shall go [m or rad]; None: nobody knows yet.
-      in_stages: Knobs are to be held deeper than usual, even if that leads less far.
+      in_stages: Knobs are to be held deeper than usual, even if that leads less far; bars may be held anywhere.
 
     Raises:
       StageFailure: None moves it by a fair share of the way.
@@ -66,12 +66,17 @@ def grip_handle(
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways: list[PartWay] = []
-    for depth in _DEPTHS_IN_STAGES if in_stages else _DEPTHS:
+    for kind in _KINDS_IN_STAGES if in_stages else _KINDS:
         led = (
             find_way(planner, part, hold, opening, near=estimate.joints)
-            for hold in grips(part, depth)
+            for hold in grips(part, kind)
         )
-        free = (ending_free(planner, part, way) for way in led if way is not None)
+        held = (
+            way
+            for way in led
+            if way is not None and (kind != "aside" or _closes_on(planner, part, way))
+        )
+        free = (ending_free(planner, part, way) for way in held)
         found = [way for way in free if way is not None]
         found.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
         ways += found
@@ -87,6 +92,12 @@ def grip_handle(
         "plan",
         f"no grip of {part.name}'s handle works: {len(stages)} could move it, none can be approached",
     )
+
+
+def _closes_on(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
+    """Whether fingers that close where a way begins meet the part: a bent bar is not all where its middle is."""
+    closed = CollisionQuery(CONTACT, opening=0.0, target=part.geoms)
+    return bool(planner.obstacles(way.joints[0], closed)[part.geoms].any())
 
 
 def _approached(

@@ -184,7 +184,7 @@ class PlaceScore:
     ) -> Bool[np.ndarray, "c"]:
         """Of `T_object_base`, points in the base frame [m] and motions of the part."""
         local = np.einsum("cij,nj->cni", inverse[:, :3, :3], points) + inverse[:, None, :3, 3]
-        clear = (_distance(local, self.shape.fixed) > radius).all(axis=1)
+        clear = np.all(_distance(local, self.shape.fixed) > radius, axis=1)
         for motion in motions:
             back = invert(motion)
             moved = local @ back[:3, :3].T + back[:3, 3]

@@ -9,6 +9,7 @@ import pytest
 
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution import primitives
+from manipose_mj.control.grasping import part_pick
 from manipose_mj.control.grasping.handle_grasps import (
     Push,
     grip_now,
@@ -17,9 +18,16 @@ from manipose_mj.control.grasping.handle_grasps import (
     shutting_pushes,
 )
 from manipose_mj.control.grasping.part_motion import PartWay, find_way
-from manipose_mj.control.grasping.part_pick import is_a_stage, leads_enough, way_in_hand
+from manipose_mj.control.grasping.part_pick import (
+    _closes_on,
+    grip_handle,
+    is_a_stage,
+    leads_enough,
+    way_in_hand,
+)
 from manipose_mj.control.grasping.part_push import push_part
 from manipose_mj.control.grasping.pick import pick_part
+from manipose_mj.control.motion.batch_ik import solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan_articulated import OPEN_SHARE, opening_to_pass
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
@@ -103,6 +111,29 @@ def test_knobs_are_held_deeper_in_stages_than_usual(scene):
     assert usual == {-0.008, 0.0}
     assert deep == {-0.006, -0.004, -0.002}
     assert not list(grips(part, "deep"))
+
+
+def test_a_long_bar_may_be_held_away_from_its_middle_where_there_is_any_of_it(scene, monkeypatch):
+    planner, estimate, part = scene
+    along = [hold.upright[0, 3] for hold in grips(part, "aside")]
+    usual = [hold.upright[0, 3] for hold in grips(part)]
+    half = part.handle.extents[0] / 2
+    assert min(np.abs(along)) > max(np.abs(usual)) and max(np.abs(along)) < half
+    ways = [
+        way
+        for hold in grips(part, "aside")
+        if (way := _way(scene, hold, part.joint.range[1])) is not None
+    ]
+    assert ways and all(_closes_on(planner, part, way) for way in ways)
+    # A hand's width before it there is nothing.
+    away = solve(planner.backed_off(ways[0].joints[0], 0.05)[None], ways[0].joints[None, :1])[0][0]
+    before = replace(ways[0], joints=np.repeat(away, len(ways[0].joints), axis=0))
+    assert not _closes_on(planner, part, before)
+    # The middle will not do: the grip is one of these.
+    monkeypatch.setattr(part_pick, "_KINDS_IN_STAGES", ("aside",))
+    grip = grip_handle(planner, estimate, part, part.joint.range[1], in_stages=True)
+    tcp = invert(part.handle_pose) @ planner.tcp_pose(grip.approach[-1])
+    assert min(abs(abs(tcp[0, 3]) - abs(slide)) for slide in along) < 2e-3
 
 
 def _before(hold, part: PartEstimate, front: np.ndarray) -> float:
