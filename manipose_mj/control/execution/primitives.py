@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
+from manipose_mj.control.execution.letting_go import opening_to_let_go, retreat_from
 from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
-from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
@@ -29,15 +28,13 @@ from manipose_mj.control.grasping.retraction import (
     retractions,
     transport_path,
 )
-from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.plan_articulated import AJAR
 from manipose_mj.control.scene.cavity_mouth import way_out
-from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
+from manipose_mj.control.scene.collision_query import GRAZING, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.mjcf.panda.robot import MAX_OPENING
 from manipose_mj.poses import invert
 
 # Past this the object in the hand is not where the grasp put it.
@@ -57,10 +54,6 @@ _IN_VAIN = 0.3  # of what a push should move a part by, under which it is not ma
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
-# How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
-_LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
-_UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
-_GIVING_WAY = (0.006, 0.012)
 
 
 @dataclass(frozen=True)
@@ -182,12 +175,12 @@ class Primitives:
 
     def _let_go(self, planner: MotionPlanner, name: str) -> Actions:
         estimate, planner = self._observe(planner)
-        yield from self._executor.open_to(_letting_go(planner, estimate, name))
+        yield from self._executor.open_to(opening_to_let_go(planner, estimate, name))
         yield from self._executor.wait(_SETTLE)
         self._executor.hold(None)
         estimate, planner = self._observe(planner)
         near = _OWN_PART if self._executor.feels_joints and name in estimate.parts else None
-        yield from self._executor.follow(_retreat(planner, estimate, name, near))
+        yield from self._executor.follow(retreat_from(planner, estimate, name, near))
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -302,7 +295,7 @@ class Primitives:
         if not planner.collides(estimate.joints, CollisionQuery(GRAZING)):
             return
         try:
-            yield from self._executor.follow(_retreat(planner, estimate, name))
+            yield from self._executor.follow(retreat_from(planner, estimate, name))
         except StageFailure:
             # Back as the hand came: the part does not follow it.
             yield from self._executor.follow(push.way.targets(self._executor.timestep)[::-1])
@@ -367,47 +360,6 @@ def retraction_of(
     for retraction in retractions(planner, estimate.joints, estimate.in_hand(name), way):
         return retraction
     raise StageFailure("plan", f"no way to lift {name}")
-
-
-def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
-    """How far to open [m]: as far as neighbours allow."""
-    released = estimate.parts.get(name) or estimate.objects[name]
-    margins = _LETTING_GO
-    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released.geoms)
-    if name in estimate.objects and estimate.objects[name].uncertainty > 0:
-        # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
-        margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
-        query = planner.excusing(estimate.joints, query)
-    for margin in margins:
-        opening = min(estimate.opening + margin, MAX_OPENING)
-        if not planner.collides(estimate.joints, replace(query, opening=opening)):
-            return opening
-    return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
-
-
-def _retreat(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
-) -> Float[np.ndarray, "t 7"]:
-    """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
-
-    Args:
-      planner: Plans in the scene of the estimate.
-      estimate: What is where.
-      name: Of what was let go.
-      near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
-
-    Raises:
-      StageFailure: There is no way.
-    """
-    released = estimate.parts.get(name) or estimate.objects[name]
-    distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
-    touched = frozenset({planner.body_name(released.body)})
-    for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
-        pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
-        if line is not None:
-            return line
-    raise StageFailure("release", f"no way to back off from {name}")
 
 
 def _place(
