@@ -34,6 +34,9 @@ from manipose_mj.tasks.instructions.sentence import instruction
 
 # Plans an episode may try, and stages whose failure another plan may mend.
 MAX_PLANS = 5
+MAX_STAGED_PLANS = (
+    4  # the same, once these have failed at a drawer or door, with parts moved in stages
+)
 MAX_LOOKS = 6  # into what was opened, where furniture is estimated
 MAX_FAILED_MOVES = 30  # the same in clutter, where each move is a plan
 _AT_END = 0.5  # after the last step [s]
@@ -114,6 +117,7 @@ class Baseline:
         self._planner = planner or RulePlanner()
         self._compiled = self._compile()
         self.status = ""
+        self._subject = ""  # of the last step begun
 
     @property
     def perception(self) -> Perception:
@@ -158,7 +162,7 @@ class Baseline:
         executor = Executor(scene.perception, timestep)
         primitives = Primitives(executor)
         rng = np.random.default_rng(seed)
-        progress, failures, allowance = _Progress(), 0, 0.0
+        progress, failures, budget, allowance = _Progress(), 0, plans, 0.0
         looks = MAX_LOOKS if scene.perception.feels_joints or scene.perception.unseen else 0
         candidates: Iterator[CandidatePlan] | None = None
         while True:
@@ -205,13 +209,19 @@ class Baseline:
                 candidates = None
             except StageFailure as failure:
                 failures += 1
-                most = MAX_FAILED_MOVES * plans // MAX_PLANS if step_by_step else plans
+                most = MAX_FAILED_MOVES * plans // MAX_PLANS if step_by_step else budget
                 # In clutter the same plan may be carried out another way.
                 counts = acted or not step_by_step
-                if scene.perception.feels_joints and counts and not falls_short:
+                staged = primitives.in_stages
+                if (scene.perception.feels_joints or staged) and counts and not falls_short:
                     progress.led_on(estimate, executor.observe())
                 same = progress.failed_again(plan, estimate, counts=counts)
                 exhausted = (same and not step_by_step) or failures == most
+                if exhausted and not (step_by_step or staged) and self._subject in estimate.parts:
+                    # All that moves this part at once has failed.
+                    primitives.in_stages, exhausted = True, False
+                    budget = failures + MAX_STAGED_PLANS
+                    progress.made()
                 mends = (*_WORTH_ANOTHER_PLAN, "release") if step_by_step else _WORTH_ANOTHER_PLAN
                 if exhausted or (failure.stage not in mends and not falls_short):
                     raise
@@ -238,7 +248,7 @@ class Baseline:
         thorough: bool,
     ) -> Iterator[Action]:
         for index, step in enumerate(plan):
-            self.status = str(step)
+            self.status, self._subject = str(step), step.subject
             if step.primitive == "grasp_at":
                 destination = _destination(plan, index)
                 yield from primitives.grasp_at(planner, step.subject, destination, thorough)

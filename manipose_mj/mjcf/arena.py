@@ -27,7 +27,7 @@ _PEDESTAL = (0.17, 0.14, 1.0)
 _PEDESTAL_X = -0.05  # of its middle: under the arm's foot, which reaches backwards
 # The top of a small table beside the pedestal, which is put to one side or the other.
 SIDE_TABLE_CENTER = (0.40, 0.38, 0.0)
-_SIDE_TABLE = (0.24, 0.24, 0.02)
+SIDE_TABLE_HALF_EXTENTS = (0.24, 0.24, 0.02)
 _AWAY = (0.0, 0.0, -30.0)  # under the floor
 
 _LEG_COLOUR = [0.45, 0.36, 0.28, 1]
@@ -88,10 +88,15 @@ class TableArena(composer.Arena):
             rgba=[0.55, 0.57, 0.60, 1],
         )  # fmt: skip
         side_table = world.add("body", name="side_table", pos=_AWAY)
-        self._add_top(side_table, "side_table", _SIDE_TABLE, (0.0, 0.0, -_SIDE_TABLE[2]))
+        self._add_top(
+            side_table,
+            "side_table",
+            SIDE_TABLE_HALF_EXTENTS,
+            (0.0, 0.0, -SIDE_TABLE_HALF_EXTENTS[2]),
+        )
         side_table.add(
             "geom", name="side_table_foot", type="box", size=[0.05, 0.05, _PEDESTAL[2]],
-            pos=[0, 0, -2 * _SIDE_TABLE[2] - _PEDESTAL[2]], rgba=_LEG_COLOUR,
+            pos=[0, 0, -2 * SIDE_TABLE_HALF_EXTENTS[2] - _PEDESTAL[2]], rgba=_LEG_COLOUR,
         )  # fmt: skip
         for camera, (position, target, fovy) in FIXED_CAMERAS.items():
             world.add(

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
+from manipose_mj.control.execution.letting_go import opening_to_let_go, retreat_from
 from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
-from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
     ending_free,
     is_a_stage,
     leads_enough,
-    off_surface,
-    push_part,
     way_in_hand,
 )
+from manipose_mj.control.grasping.part_push import off_surface, push_part
 from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.grasping.retraction import (
     Place,
@@ -30,14 +28,13 @@ from manipose_mj.control.grasping.retraction import (
     retractions,
     transport_path,
 )
-from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
+from manipose_mj.control.planning.plan_articulated import AJAR
 from manipose_mj.control.scene.cavity_mouth import way_out
-from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, CollisionQuery
-from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.control.scene.collision_query import GRAZING, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.mjcf.panda.robot import MAX_OPENING
 from manipose_mj.poses import invert
 
 # Past this the object in the hand is not where the grasp put it.
@@ -51,15 +48,12 @@ _OPENING_TOLERANCE = 0.12
 _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
+_STAGES = 6  # the same, where each may lead it less far than all the way
 _IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
 # How far beyond the shut place a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
-# How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
-_LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
-_UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
-_GIVING_WAY = (0.006, 0.012)
 
 
 @dataclass(frozen=True)
@@ -76,6 +70,10 @@ class Primitives:
 
     The planner that a primitive takes says what to assume; it plans in the scene of every new
     observation. Raises `StageFailure` where a step cannot be done.
+
+    Attributes:
+      in_stages: Whether parts may be pushed several times, each as far as a push leads, also where no grip comes first
+        or the hand slipped off, and knobs are held deeper: a last resort.
     """
 
     def __init__(self, executor: Executor) -> None:
@@ -85,6 +83,11 @@ class Primitives:
         self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
         self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
+        self.in_stages = False
+        # Of parts: where the hand last led each by its handle from, and where to [m or rad].
+        self._led: dict[str, tuple[float, float]] = {}
+        # A part that is pushed on though the plan has it led by its handle.
+        self._ungripped: str | None = None
 
     @property
     def held(self) -> str | None:
@@ -101,7 +104,14 @@ class Primitives:
         estimate, planner = self._observe(planner)
         if name in estimate.parts:
             opening = None if destination is None else destination.opening
-            pick = pick_part(planner, estimate, estimate.parts[name], opening)
+            part = estimate.parts[name]
+            try:
+                pick = pick_part(planner, estimate, part, opening, in_stages=self.in_stages)
+            except StageFailure:
+                if not self.in_stages or not _can_be_pushed_on(part, opening):
+                    raise
+                self._ungripped = name
+                return
         else:
             poses = () if destination is None else destination.poses
             slipped = self._slipped.get(name, ())
@@ -132,6 +142,9 @@ class Primitives:
     def release(self, planner: MotionPlanner, name: str) -> Actions:
         """Let go and back off along the approach."""
         held, self._held = self._held, None
+        ungripped, self._ungripped = self._ungripped, None
+        if held is None and name == ungripped:
+            return
         if held is None:
             raise StageFailure("plan", f"release {name} while nothing is held")
         if not isinstance(held.pick, PartPick):
@@ -162,12 +175,12 @@ class Primitives:
 
     def _let_go(self, planner: MotionPlanner, name: str) -> Actions:
         estimate, planner = self._observe(planner)
-        yield from self._executor.open_to(_letting_go(planner, estimate, name))
+        yield from self._executor.open_to(opening_to_let_go(planner, estimate, name))
         yield from self._executor.wait(_SETTLE)
         self._executor.hold(None)
         estimate, planner = self._observe(planner)
         near = _OWN_PART if self._executor.feels_joints and name in estimate.parts else None
-        yield from self._executor.follow(_retreat(planner, estimate, name, near))
+        yield from self._executor.follow(retreat_from(planner, estimate, name, near))
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -205,6 +218,7 @@ class Primitives:
         assert step.opening is not None and self._held is not None
         estimate, planner = self._observe(planner)
         part = estimate.parts[step.subject]
+        self._led[part.name] = (part.opening, step.opening)
         self._check_held(estimate, step.subject)
         if self._executor.feels_joints:
             yield from lead_part(self._executor, planner, step.subject, step.opening)
@@ -219,6 +233,9 @@ class Primitives:
         yield from self._executor.follow(way.targets(self._executor.timestep))
         moved = self._executor.observe().parts[part.name].opening
         low, high = part.joint.range
+        now = replace(part, opening=moved)
+        if self.in_stages and _can_be_pushed_on(now, step.opening):
+            return
         if abs(moved - way.openings[-1]) > _OPENING_TOLERANCE * (high - low):
             raise StageFailure(
                 "motion",
@@ -236,8 +253,10 @@ class Primitives:
         """
         part = self._executor.observe().parts[name]
         span = float(np.ptp(part.joint.range))
-        for _ in range(_PUSHES):
+        for _ in range(_STAGES if self.in_stages else _PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
+                return
+            if self.in_stages and self._led_beyond(part, opening):
                 return
             yield from self._push_once(planner, name, opening)
             part = self._executor.observe().parts[name]
@@ -246,20 +265,27 @@ class Primitives:
                 "motion", f"{name} is at {part.opening:.3f}, should be at {opening:.3f}"
             )
 
+    def _led_beyond(self, part: PartEstimate, opening: float) -> bool:
+        """Whether the hand has led a part there and on: it need not come back."""
+        start, end = self._led.get(part.name, (opening, opening))
+        return end == opening and (part.opening - opening) * (opening - start) > 0
+
     def _push_once(self, planner: MotionPlanner, name: str, opening: float) -> Actions:
         yield from self._executor.close()
         estimate, planner = self._observe(planner)
         part = estimate.parts[name]
         beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
         aim = opening - beyond if opening <= part.joint.range[0] else opening
-        push = push_part(planner, estimate, part, aim, self._in_vain.get(name, ()))
+        in_vain = self._in_vain.get(name, ())
+        push = push_part(planner, estimate, part, aim, in_vain, in_stages=self.in_stages)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
         self._executor.pushed(name, float(push.way.openings[-1]))
         estimate, planner = self._observe(planner)
         gone = abs(estimate.parts[name].opening - part.opening)
-        if gone < _IN_VAIN * abs(opening - part.opening) and isinstance(push.way.hold, Push):
+        meant = min(abs(opening - part.opening), abs(push.way.openings[-1] - part.opening))
+        if gone < _IN_VAIN * meant and isinstance(push.way.hold, Push):
             self._in_vain.setdefault(name, []).append(push.way.hold)
         back = off_surface(planner, estimate.parts[name], push.way, estimate.joints)
         if back is not None:
@@ -269,7 +295,7 @@ class Primitives:
         if not planner.collides(estimate.joints, CollisionQuery(GRAZING)):
             return
         try:
-            yield from self._executor.follow(_retreat(planner, estimate, name))
+            yield from self._executor.follow(retreat_from(planner, estimate, name))
         except StageFailure:
             # Back as the hand came: the part does not follow it.
             yield from self._executor.follow(push.way.targets(self._executor.timestep)[::-1])
@@ -316,6 +342,12 @@ class Primitives:
         return now
 
 
+def _can_be_pushed_on(part: PartEstimate, opening: float | None) -> bool:
+    """Whether it is a door, wide enough open to be pushed open further from inside."""
+    ajar = part.joint.kind == "hinge" and part.opening > part.joint.range[0] + AJAR
+    return ajar and opening is not None and opening > part.opening
+
+
 def retraction_of(
     planner: MotionPlanner, estimate: SceneEstimate, name: str
 ) -> Float[np.ndarray, "t 7"]:
@@ -328,47 +360,6 @@ def retraction_of(
     for retraction in retractions(planner, estimate.joints, estimate.in_hand(name), way):
         return retraction
     raise StageFailure("plan", f"no way to lift {name}")
-
-
-def _letting_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
-    """How far to open [m]: as far as neighbours allow."""
-    released = estimate.parts.get(name) or estimate.objects[name]
-    margins = _LETTING_GO
-    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released.geoms)
-    if name in estimate.objects and estimate.objects[name].uncertainty > 0:
-        # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
-        margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
-        query = planner.excusing(estimate.joints, query)
-    for margin in margins:
-        opening = min(estimate.opening + margin, MAX_OPENING)
-        if not planner.collides(estimate.joints, replace(query, opening=opening)):
-            return opening
-    return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
-
-
-def _retreat(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
-) -> Float[np.ndarray, "t 7"]:
-    """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
-
-    Args:
-      planner: Plans in the scene of the estimate.
-      estimate: What is where.
-      name: Of what was let go.
-      near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
-
-    Raises:
-      StageFailure: There is no way.
-    """
-    released = estimate.parts.get(name) or estimate.objects[name]
-    distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
-    touched = frozenset({planner.body_name(released.body)})
-    for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
-        pushing = planner.allowing(max(allowance, planner.contact_allowance))
-        line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
-        if line is not None:
-            return line
-    raise StageFailure("release", f"no way to back off from {name}")
 
 
 def _place(

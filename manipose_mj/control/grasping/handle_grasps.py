@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import radians
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -33,8 +34,10 @@ _MAX_WIDTH = MAX_OPENING - 0.004  # of what the gripper takes [m]
 _CROSSWISE = compose(rotation_about(np.array([0.0, 1.0, 0.0]), -np.pi / 2), np.zeros(3))
 # Of a hand farther out: at least [m], and of the depth of a bar and of a knob.
 _BACK, _BACK_SHARE, _KNOB_SHARE = 0.004, 0.25, 0.5
+_DEEP_SHARES = (0.125, 0.25, 0.375)  # of the depth of a knob
 _BEFORE = 0.002  # of a hand that holds a bar by its fingertips, from the bar's front [m]
 _SLIDES = (0.0, 0.025, -0.025)  # along the bar, from its middle [m]
+_ASIDE = (0.4, -0.4, 0.8, -0.8)  # the same, as shares of what is free on either side
 # From the TCP to the closed fingers' tips, half their width and half their thickness [m].
 _TIP = FINGER_BOXES[2][1][2] + FINGER_OFFSET - TCP_OFFSET
 _HALF_WIDTH = PAD_BOX[1][0]
@@ -137,35 +140,50 @@ class Push:
         return np.stack(poses)
 
 
-def grips(part: PartEstimate, *, fingertips: bool = False) -> Iterator[Grip]:
+GripKind = Literal["usual", "fingertips", "deep", "aside"]
+
+
+def grips(part: PartEstimate, kind: GripKind = "usual") -> Iterator[Grip]:
     """Around the bar of the part's handle, its middle first; the hand comes along -Y of the label.
 
     A knob or a short bar is taken across too.
 
     Args:
       part: Has the handle.
-      fingertips: Only by the front of the bar, which leaves the most room to what is behind it.
+      kind: `"fingertips"`: only by the front of the bar, which leaves the most room to what is behind it. `"deep"`:
+        only around the widest place of a knob, or as near to it as there is room; a round one slips out of
+        fingers on its front half. No bar is so held. `"aside"`: only away from the middle of a long bar.
     """
-    along, depth, across = part.handle.extents
+    along, height, across = part.handle.extents
     knob = along < _MAX_WIDTH
     ways = [(np.eye(4), across, along)]
     if knob:
         ways.append((_CROSSWISE, along, across))
     # It is held by its front too: there is more room behind the fingertips, and the hand can tilt more.
-    backs = (0.0, max((_KNOB_SHARE if knob else _BACK_SHARE) * depth, _BACK))
-    if fingertips:
-        backs = (depth / 2 + _BEFORE,)
+    backs = (0.0, max((_KNOB_SHARE if knob else _BACK_SHARE) * height, _BACK))
+    if kind == "fingertips":
+        backs = (height / 2 + _BEFORE,)
+    elif kind == "deep":
+        backs = tuple(share * height for share in _DEEP_SHARES) if knob else ()
+    elif kind == "aside":
+        backs = (0.0,)
     for (turn, width, length), back in product(ways, backs):
         free = length / 2 - _MIN_GRIP
-        for slide in _SLIDES:
-            if slide and (abs(slide) > free or back):
-                continue
+        for slide in _slides(free, back, kind):
             for sign in (1.0, -1.0):
                 x = np.array([sign, 0.0, 0.0])
                 approach = np.array([0.0, -1.0, 0.0])
                 rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
                 upright = compose(rotation, slide * _X - back * approach)
                 yield Grip(part.handle.pose @ turn, upright, float(width))
+
+
+def _slides(free: float, back: float, kind: GripKind) -> list[float]:
+    """Along the bar, from its middle [m]."""
+    if kind == "aside":
+        aside = [share * free for share in _ASIDE]
+        return [slide for slide in aside if abs(slide) > _SLIDES[1]]
+    return [slide for slide in _SLIDES if not slide or (abs(slide) <= free and not back)]
 
 
 def shutting_pushes(planner: MotionPlanner, part: PartEstimate) -> Iterator[Push]:

@@ -1,32 +1,22 @@
-"""Taking a door by its handle, and pushing a drawer or door, so that it can be moved all the way."""
+"""Taking a drawer or door by its handle so that it can be moved all the way, or a fair share of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.grasping.handle_grasps import (
-    Push,
-    grip_now,
-    grips,
-    opening_pushes,
-    shifted,
-    shutting_pushes,
-)
-from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way, promise
+from manipose_mj.control.grasping.handle_grasps import GripKind, grip_now, grips
+from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.scene.articulation import joint_motion, with_part_at
+from manipose_mj.control.scene.articulation import with_part_at
 from manipose_mj.control.scene.collision_query import CONTACT, Clearance, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 
 _STANDOFFS = (0.10, 0.07, 0.05)  # from which a handle is approached [m]
-# From which a surface is approached: off it, and back along the hand [m].
-_PUSH_STANDOFFS = ((0.05, 0.0), (0.03, 0.0), (0.02, 0.12), (0.02, 0.07))
 # A grip that moves a part by less than this share of what is asked is of no use; a door is pushed
 # the rest of the way.
 _MIN_SHARE = {"hinge": 0.35, "slide": 0.98}
@@ -34,9 +24,10 @@ _AJAR = 0.5  # of a door, enough to reach behind it [rad]
 # A way that ends sooner is worth it where none goes on: the hand takes hold again from there [m or rad].
 _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
-_ALIKE = 0.03  # between pushes that meet a part at nearly the same place [m]
-_MAX_PUSHES = 24  # for which a way is looked for
-_MAX_TRIES = 12  # complete ways for which an approach is looked for
+_MAX_TRIES = 12  # ways for which an approach is looked for
+# How a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
+_KINDS: tuple[GripKind, ...] = ("usual", "fingertips")
+_KINDS_IN_STAGES: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
 
 
 @dataclass(frozen=True)
@@ -50,18 +41,13 @@ class HandleGrip:
     width: float
 
 
-@dataclass(frozen=True)
-class PartPush:
-    """How to push a part: joint targets to where the approach starts, along it and of the push
-    itself `(t, 7)`; way: what the push does."""
-
-    free_path: Float[np.ndarray, "t 7"]
-    approach: Float[np.ndarray, "s 7"]
-    way: PartWay
-
-
 def grip_handle(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float | None
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    opening: float | None,
+    *,
+    in_stages: bool = False,
 ) -> HandleGrip:
     """A grip of the handle that can be approached and moves the part as far as any, and get off there.
 
@@ -70,6 +56,7 @@ def grip_handle(
       estimate: What is where.
       part: What to take.
       opening: Where it shall go [m or rad]; None: nobody knows yet.
+      in_stages: Knobs are to be held deeper than usual, even if that leads less far; bars may be held anywhere.
 
     Raises:
       StageFailure: None moves it by a fair share of the way.
@@ -79,12 +66,17 @@ def grip_handle(
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways: list[PartWay] = []
-    for fingertips in (False, True):
+    for kind in _KINDS_IN_STAGES if in_stages else _KINDS:
         led = (
             find_way(planner, part, hold, opening, near=estimate.joints)
-            for hold in grips(part, fingertips=fingertips)
+            for hold in grips(part, kind)
         )
-        free = (ending_free(planner, part, way) for way in led if way is not None)
+        held = (
+            way
+            for way in led
+            if way is not None and (kind != "aside" or _closes_on(planner, part, way))
+        )
+        free = (ending_free(planner, part, way) for way in held)
         found = [way for way in free if way is not None]
         found.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
         ways += found
@@ -100,6 +92,12 @@ def grip_handle(
         "plan",
         f"no grip of {part.name}'s handle works: {len(stages)} could move it, none can be approached",
     )
+
+
+def _closes_on(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
+    """Whether fingers that close where a way begins meet the part: a bent bar is not all where its middle is."""
+    closed = CollisionQuery(CONTACT, opening=0.0, target=part.geoms)
+    return bool(planner.obstacles(way.joints[0], closed)[part.geoms].any())
 
 
 def _approached(
@@ -146,44 +144,6 @@ def way_in_hand(
     )
 
 
-def push_part(
-    planner: MotionPlanner,
-    estimate: SceneEstimate,
-    part: PartEstimate,
-    opening: float,
-    in_vain: Sequence[Push] = (),
-) -> PartPush:
-    """A push with closed fingers that moves the part all the way; none near those that were made in vain.
-
-    Raises:
-      StageFailure: There is none.
-    """
-    complete = tried = 0
-    holds = list(_pushes(planner, part, opening))
-    holds = [hold for hold in holds if not any(_alike(hold, other) for other in in_vain)]
-    holds.sort(key=lambda hold: -promise(part, hold, opening))
-    for hold in holds[:_MAX_PUSHES]:
-        tried += 1
-        way = find_way(planner, part, hold, opening, near=estimate.joints)
-        if way is None or share_of(way, part, opening) < 0.999:
-            continue
-        complete += 1
-        start_tilt = float(way.tilts[0])
-        query = CollisionQuery(CONTACT, opening=hold.opening, target=part.geoms)
-        for line in _lines_off(planner, part, hold, start_tilt, way.joints[0], query):
-            free_path = planner.free_path(
-                estimate.joints, line[-1], CollisionQuery(opening=hold.opening)
-            )
-            if free_path is not None:
-                approach = np.concatenate([line[::-1], way.joints[:1]])
-                return PartPush(free_path, approach, way)
-        if complete == _MAX_TRIES:
-            break
-    raise StageFailure(
-        "plan", f"no push moves {part.name}: {tried} tried, {complete} of them lead all the way"
-    )
-
-
 def ending_free(
     planner: MotionPlanner, part: PartEstimate, way: PartWay, clearance: Clearance = APPROACH
 ) -> PartWay | None:
@@ -196,30 +156,6 @@ def ending_free(
         if _can_get_off(planner, part, shorter, clearance):
             return shorter
     return None
-
-
-def off_surface(
-    planner: MotionPlanner, part: PartEstimate, way: PartWay, joints: Float[np.ndarray, "7"]
-) -> Float[np.ndarray, "t 7"] | None:
-    """Joint targets away from what was pushed, from where the push ended; out of what estimates have the hand in."""
-    assert isinstance(way.hold, Push)
-    usual = CollisionQuery(CONTACT, target=part.geoms)
-    for query in (usual, planner.excusing(joints, usual)):
-        for line in _lines_off(planner, part, way.hold, float(way.tilts[-1]), joints, query):
-            return line
-    return None
-
-
-def _pushes(planner: MotionPlanner, part: PartEstimate, opening: float) -> Iterator[Push]:
-    if opening < part.opening:
-        return shutting_pushes(planner, part)
-    return opening_pushes(planner, part)
-
-
-def _alike(one: Push, other: Push) -> bool:
-    """Whether two pushes meet a part at nearly the same place."""
-    near = float(np.linalg.norm(one.point - other.point)) < _ALIKE
-    return near and one.flat == other.flat and float(one.normal @ other.normal) > 0.9
 
 
 def share_of(way: PartWay, part: PartEstimate, opening: float) -> float:
@@ -273,22 +209,3 @@ def _backwards(
         if back is not None:
             return np.concatenate([back[::-1], joints[None]])
     return None
-
-
-def _lines_off(
-    planner: MotionPlanner,
-    part: PartEstimate,
-    hold: Push,
-    tilt: float,
-    joints: Float[np.ndarray, "7"],
-    query: CollisionQuery,
-) -> Iterator[Float[np.ndarray, "t 7"]]:
-    """Straight lines off the surface, the part where the scene has it."""
-    touched = frozenset({planner.body_name(part.body)}) | planner.ignored(query)
-    pose = part.base_pose @ joint_motion(part, part.opening)
-    for away, back in _PUSH_STANDOFFS:
-        goal = pose @ shifted(hold, away).tcp_poses(np.array([tilt]))[0]
-        goal[:3, 3] -= back * goal[:3, 2]
-        line = planner.line(joints, goal, query, touched=touched)
-        if line is not None:
-            yield line

@@ -178,14 +178,21 @@ def _pick(
 
 
 def pick_part(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, opening: float | None
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    opening: float | None,
+    *,
+    in_stages: bool = False,
 ) -> PartPick:
     """A grip of the handle that can be approached and moves the part towards `opening`; None: anywhere.
+
+    `in_stages` as of `grip_handle`.
 
     Raises:
       StageFailure: There is none.
     """
-    grip = grip_handle(planner, estimate, part, opening)
+    grip = grip_handle(planner, estimate, part, opening, in_stages=in_stages)
     return PartPick(grip.free_path, grip.approach, grip.width, grip.opening, grip.approach[-1])
 
 

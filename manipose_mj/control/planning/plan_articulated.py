@@ -24,6 +24,7 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimat
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.tasks.articulated.hand_room import Placement, count_clear, hands_around
+from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN
 from manipose_mj.tasks.goals import Goal, InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
 
 PartGoal = InsideGoal | TakenOutGoal | OpenGoal | ShutGoal
@@ -137,13 +138,12 @@ def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
 def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:
     """Plans that open a part, to see what is behind it; no steps where it is open."""
     part = estimate.parts[name]
-    low, high = part.joint.range
-    if part.opening >= low + OPEN_ENOUGH * (high - low):
+    if _lets_pass(part):
         yield ()
         return
-    wide_open = low + OPEN_SHARE * (high - low)
+    wide_open = opening_to_pass(part)
     yield _open(part, wide_open)
-    if part.joint.kind == "hinge" and part.opening > low + AJAR:
+    if part.joint.kind == "hinge" and part.opening > part.joint.range[0] + AJAR:
         yield (Step("move_to", name, opening=wide_open),)
 
 
@@ -162,22 +162,32 @@ def _plans_through(
     part: PartEstimate,
 ) -> Iterator[Plan]:
     """Plans that open the part where it is shut, and bring the object into it or out of it."""
-    obj, (low, high) = estimate.objects[goal.object], part.joint.range
-    wide_open = low + OPEN_SHARE * (high - low)
+    obj, wide_open = estimate.objects[goal.object], opening_to_pass(part)
     if isinstance(goal, InsideGoal):
         poses = poses_in_cavity(obj, part, wide_open, estimate)
         if not poses:
             raise InputError(f"{goal.object} fits the cavity of {goal.part} in no orientation")
     else:
         poses = poses_in_area(goal, obj)
-    is_shut = part.opening < low + OPEN_ENOUGH * (high - low)
-    opening = _open(part, wide_open) if is_shut else ()
+    opening = () if _lets_pass(part) else _open(part, wide_open)
     if planner is None or lies_inside(obj, part):
         yield opening + place_at_each(goal.object, (poses,))
         return
     by_then = with_part_at(planner.scene, part, max(wide_open, part.opening))
     for stops in routes(planner.within(by_then), estimate, obj, poses):
         yield opening + place_at_each(goal.object, stops)
+
+
+def opening_to_pass(part: PartEstimate) -> float:
+    """How far a part is opened for a hand to pass with what it holds [m or rad]."""
+    low, high = part.joint.range
+    wide_open = OPEN_SHARE * (high - low)
+    return low + (min(wide_open, WIDE_OPEN) if part.joint.kind == "hinge" else wide_open)
+
+
+def _lets_pass(part: PartEstimate) -> bool:
+    low = part.joint.range[0]
+    return part.opening >= low + OPEN_ENOUGH / OPEN_SHARE * (opening_to_pass(part) - low)
 
 
 def _open(part: PartEstimate, opening: float) -> Plan:

@@ -18,6 +18,7 @@ _GRIP_TILT, _PUSH_TILT = radians(75), radians(90)
 _INSET = 0.022  # of a push on a door's inside, from its free edge [m]
 # Of a grip, by the front of what it holds: at least [m], and of the depth of a bar and of a knob.
 _BACK, _BACK_SHARE, _KNOB_SHARE = 0.004, 0.25, 0.5
+_BEFORE = 0.002  # of a grip by the fingertips, from the bar's front [m]
 _TIP = 0.009  # from the TCP to the closed fingers' tips [m]
 _SHARES = (1.0, 0.6, 0.35)  # of a door's radius, where it may be pushed
 
@@ -35,13 +36,18 @@ class HandPlaces:
     opening: float | None = None
 
 
-def around_the_bar(part: MovingPart) -> tuple[HandPlaces, ...]:
-    """Grips of the handle's bar, and across it where it is short; the hand comes along -Y of the label."""
+def around_the_bar(part: MovingPart, *, fingertips: bool = False) -> tuple[HandPlaces, ...]:
+    """Grips of the handle's bar, and across it where it is short; the hand comes along -Y of the label.
+
+    `fingertips`: only by its front.
+    """
     handle = part.handle
     assert handle is not None
     x, out, z = handle.rotation.T
     along, depth, across = handle.extents
     back = max(_BACK, (_KNOB_SHARE if along < MAX_OPENING else _BACK_SHARE) * depth)
+    if fingertips:
+        back = depth / 2 + _BEFORE
     bars = [(x, across), (z, along)] if along < MAX_OPENING else [(x, across)]
     return tuple(
         HandPlaces(_tilted(handle.origin, out, bar, bar, _GRIP_TILT, back), float(width))

@@ -16,6 +16,8 @@ from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.physics import COLLISION_GROUP
 from manipose_mj.poses import compose, rotation_about
 
+# How far a door has to be open at most for a hand to pass with what it holds [rad]; some fold back by half a turn.
+WIDE_OPEN = 2.0
 _BESIDE = 0.01  # how far what carries a handle sticks out beside it [m]
 _NEAR = 0.06  # of a handle [m]
 _COLUMNS, _LEVELS = 5, 10

@@ -26,13 +26,13 @@ from manipose_mj.tasks.articulated.hand_places import (
     chained,
     on_the_front,
 )
-from manipose_mj.tasks.articulated.part_shape import PartShape, part_motion
+from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN, PartShape, part_motion
 
 LAYERS = 10  # openings looked at
 COMPLETE = (
     0.9  # a score from which on the arm can move the part all the way, in two stages at least
 )
-_TRAVEL = 0.95  # of the joint's range
+TRAVEL = 0.95  # of the joint's range, over which the hand is followed
 _STEPS = 2  # tilts between layers
 _AJAR = 0.5  # of a door, to be pushed on from inside [rad]
 _EASE = 0.1  # how much the share of tilts counts that the arm can choose from
@@ -68,8 +68,9 @@ class PlaceScore:
       part: Has a handle.
       shape: Where it is.
       layer: Of `LAYERS` openings the one at which the part starts, to be shut; 0: to be opened.
-      back: Whether it is to be shut again after it was opened.
+      back: Whether it is to be shut again after it was opened so far that a hand can reach in.
       objects: `(n, 3)`, where objects may be, in the base frame [m]; the part stays off there.
+      fingertips: Whether the handle is held by its front only, for which there is more room.
     """
 
     part: MovingPart
@@ -77,6 +78,7 @@ class PlaceScore:
     layer: int = 0
     back: bool = False
     objects: Float[np.ndarray, "n 3"] | None = None
+    fingertips: bool = False
 
     def __call__(
         self, bases: Float[np.ndarray, "c 4 4"], floors: Float[np.ndarray, "c"]
@@ -87,9 +89,7 @@ class PlaceScore:
           bases: `T_base_object`.
           floors: Height of what the hand has to stay above [m].
         """
-        low, high = self.part.joint.range
-        openings = low + _TRAVEL * (high - low) * np.linspace(0, 1, LAYERS)
-        motions = np.stack([part_motion(self.part, float(q)) for q in openings])
+        motions = self._motions()
         result = np.full(len(bases), -1.0)
         chosen = np.flatnonzero(self._robot_clear(bases, motions) & self._seen(bases))
         if not len(chosen):
@@ -107,13 +107,13 @@ class PlaceScore:
     def _opening(self, around: _Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Share of the travel, and of the hand's poses there, as the handle leads; then from inside."""
         led, ease = np.zeros(len(around.bases)), np.zeros(len(around.bases))
-        for grip in around_the_bar(self.part):
+        for grip in around_the_bar(self.part, fingertips=self.fingertips):
             way = chained(around.free(grip), _STEPS, seed=around.approached(grip))
             led = np.maximum(led, _share(way))
             ease = np.maximum(ease, way.mean(axis=(1, 2)))
         value = led.copy()
         if self.part.joint.kind == "hinge":
-            ajar_share = min(_AJAR / (_TRAVEL * np.ptp(self.part.joint.range)), 1.0)
+            ajar_share = min(_AJAR / self._travel(), 1.0)
             for hold in behind_the_door(self.part, self.shape):
                 ajar = np.flatnonzero((value < COMPLETE) & (led >= ajar_share))
                 if not len(ajar):
@@ -138,22 +138,57 @@ class PlaceScore:
             ease[open_] = np.maximum(ease[open_], way.mean(axis=(1, 2)))
         return value, ease
 
+    def stays_off(
+        self, bases: Float[np.ndarray, "c 4 4"], points: Float[np.ndarray, "n 3"], radius: float
+    ) -> Bool[np.ndarray, "c"]:
+        """Whether the furniture, and the part all along, stays off some points.
+
+        Args:
+          bases: `T_base_object`.
+          points: In the base frame [m].
+          radius: How near it may not come to any of them [m].
+        """
+        return self._clear_of(invert(bases), points, radius, self._motions())
+
+    def _travel(self) -> float:
+        """Of the joint [m or rad]."""
+        travel = TRAVEL * float(np.ptp(self.part.joint.range))
+        reached_into = self.back and self.part.joint.kind == "hinge"
+        return min(travel, WIDE_OPEN) if reached_into else travel
+
+    def _motions(self) -> Float[np.ndarray, "k 4 4"]:
+        """Of the part, at each opening looked at."""
+        openings = self.part.joint.range[0] + self._travel() * np.linspace(0, 1, LAYERS)
+        return np.stack([part_motion(self.part, float(q)) for q in openings])
+
     def _robot_clear(self, bases: np.ndarray, motions: np.ndarray) -> Bool[np.ndarray, "c"]:
         """Whether the furniture, and the part all along, stays off the robot's foot, the arm at home and
         the objects."""
-        shape, clear = self.shape, np.ones(len(bases), bool)
+        clear = np.ones(len(bases), bool)
         base_points = [(_FOOT, _FOOT_RADIUS, True), (*_arm_at_home(), False)]
         if self.objects is not None:
             base_points.append((self.objects, _OBJECT_RADIUS, True))
         inverse = invert(bases)
         for points, radius, always in base_points:
-            local = np.einsum("cij,nj->cni", inverse[:, :3, :3], points) + inverse[:, None, :3, 3]
-            clear &= (_distance(local, shape.fixed) > radius).all(axis=1)
             # The arm is at home at first, when the part is shut or, where it is to be shut, open.
-            for motion in motions if always else motions[[0, self.layer]]:
-                back = invert(motion)
-                moved = local @ back[:3, :3].T + back[:3, 3]
-                clear &= (_distance(moved, shape.moving[None]) > radius).all(axis=1)
+            own = motions if always else motions[[0, self.layer]]
+            clear &= self._clear_of(inverse, points, radius, own)
+        return clear
+
+    def _clear_of(
+        self,
+        inverse: Float[np.ndarray, "c 4 4"],
+        points: Float[np.ndarray, "n 3"],
+        radius: float | Float[np.ndarray, "n"],
+        motions: Float[np.ndarray, "m 4 4"],
+    ) -> Bool[np.ndarray, "c"]:
+        """Of `T_object_base`, points in the base frame [m] and motions of the part."""
+        local = np.einsum("cij,nj->cni", inverse[:, :3, :3], points) + inverse[:, None, :3, 3]
+        clear = np.all(_distance(local, self.shape.fixed) > radius, axis=1)
+        for motion in motions:
+            back = invert(motion)
+            moved = local @ back[:3, :3].T + back[:3, 3]
+            clear &= (_distance(moved, self.shape.moving[None]) > radius).all(axis=1)
         return clear
 
     def _seen(self, bases: np.ndarray) -> Bool[np.ndarray, "c"]:

@@ -14,17 +14,28 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
-from manipose_mj.mjcf.arena import SIDE_TABLE_CENTER, TABLE_CENTER, TABLE_HALF_EXTENTS
+from manipose_mj.mjcf.arena import (
+    SIDE_TABLE_CENTER,
+    SIDE_TABLE_HALF_EXTENTS,
+    TABLE_CENTER,
+    TABLE_HALF_EXTENTS,
+)
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.articulated.part_choice import kind_of
 from manipose_mj.tasks.articulated.part_shape import PartShape, part_shape
-from manipose_mj.tasks.articulated.place_score import COMPLETE, LAYERS, PlaceScore
+from manipose_mj.tasks.articulated.place_score import (
+    COMPLETE,
+    LAYERS,
+    TRAVEL,
+    PlaceScore,
+)
 from manipose_mj.tasks.core.start import Mount
 
 # A place that was found good is so nearby too [m, rad].
 _SHIFT, _TURN = 0.006, radians(1)
 _UP = np.array([0.0, 0.0, 1.0])
 _BATCH, _BATCHES = 64, 8  # candidates
+_MORE_BATCHES = 48  # where these have too few good places
 _KEPT = 24
 _ENOUGH = 8  # good places on the table, or the piece stands elsewhere
 _HALF = LAYERS // 2
@@ -39,6 +50,11 @@ _PEDESTAL = 0.05  # height of the lowest [m]
 _OBJECTS = np.array(
     [(x, y, z) for x in (-0.15, 0.0, 0.15) for y in (-0.15, 0.0, 0.15) for z in (0.05, 0.2)]
 )
+# Points all over the side table, from the middle of its top, and how near nothing may come to them [m].
+_SIDE_TABLE = SIDE_TABLE_HALF_EXTENTS * np.array(
+    [(x, y, -1.0) for x in np.linspace(-1, 1, 7) for y in np.linspace(-1, 1, 7)]
+)
+_SIDE_TABLE_RADIUS = 0.06
 
 
 @dataclass(frozen=True)
@@ -105,7 +121,7 @@ def widest_start(asset: Asset, part: MovingPart, standing: Standing | None = Non
     All of it, but for doors that fold back so far that the arm cannot get before them anywhere.
     """
     _, best = _good_places(_Key(asset, part), LAYERS - 1, standing or Standing())
-    return 1.0 if best >= COMPLETE else _HALF / (LAYERS - 1)
+    return 1.0 if best >= COMPLETE else TRAVEL * _HALF / (LAYERS - 1)
 
 
 def _layer(fraction: float) -> int:
@@ -145,25 +161,61 @@ class _Key:
 
 @lru_cache(maxsize=1024)
 def _good_places(key: _Key, layer: int, standing: Standing) -> tuple[tuple[Place, ...], float]:
-    """The best of the places that are drawn for a part, and the best score; on the table where there are enough."""
+    """The best of the places that are drawn for a part, and the best score.
+
+    Those from where the arm cannot move the part all the way count only if all are such, all around the robot and for
+    a hand that holds the handle by its fingertips too.
+    """
+    found = _found(key, layer, standing)
+    around = Standing(objects=standing.objects)
+    for fingertips in (False, True):
+        if found[0][0] < COMPLETE and (fingertips or standing != around):
+            again = _found(key, layer, around, fingertips=fingertips)
+            found = max(found, again, key=lambda places: places[0][0])
+    best = found[0][0]
+    least = min(best - _SPREAD, found[_ENOUGH - 1][0])
+    if best >= COMPLETE:
+        least = max(least, COMPLETE)
+    return tuple(place for value, place in found[:_KEPT] if value >= least), best
+
+
+def _found(
+    key: _Key, layer: int, standing: Standing, *, fingertips: bool = False
+) -> list[tuple[float, Place]]:
+    """Candidates with their scores, the best first; on the table where there are enough, more where there are few."""
     shape = part_shape(key.asset, key.part)
     objects = None
     if standing.objects:
         objects = _OBJECTS + np.array(SIDE_TABLE_CENTER) * [1.0, -side(key.part), 1.0]
-    score = PlaceScore(key.part, shape, layer, standing.objects, objects)
+    score = PlaceScore(key.part, shape, layer, standing.objects, objects, fingertips)
     best: list[tuple[float, Place]] = []
     for on_table in (True, False) if fits_table(shape) else (False,):
         rng = np.random.RandomState(0)
         for _ in range(_BATCHES):
-            drawn = [_drawn(rng, key.part, shape, standing, on_table) for _ in range(_BATCH)]
-            best += zip(_scores(score, shape, drawn).tolist(), drawn, strict=True)
+            best += _scored(rng, score, standing, on_table)
             if sum(value >= 1.0 for value, _ in best) >= _KEPT:
                 break
         best.sort(key=lambda found: -found[0])
-        if best[_ENOUGH - 1][0] >= COMPLETE:
+        if _enough(best):
+            return best
+    for _ in range(_MORE_BATCHES if best[0][0] >= COMPLETE else 0):
+        best += _scored(rng, score, standing, False)
+        if _enough(best):
             break
-    least = min(best[0][0] - _SPREAD, best[_ENOUGH - 1][0])
-    return tuple(place for value, place in best[:_KEPT] if value >= least), best[0][0]
+    best.sort(key=lambda found: -found[0])
+    return best
+
+
+def _enough(found: list[tuple[float, Place]]) -> bool:
+    return sum(value >= COMPLETE for value, _ in found) >= _ENOUGH
+
+
+def _scored(
+    rng: np.random.RandomState, score: PlaceScore, standing: Standing, on_table: bool
+) -> list[tuple[float, Place]]:
+    """A batch of candidates, each with its score."""
+    drawn = [_drawn(rng, score.part, score.shape, standing, on_table) for _ in range(_BATCH)]
+    return list(zip(_scores(score, score.shape, drawn).tolist(), drawn, strict=True))
 
 
 def _drawn(
@@ -200,7 +252,12 @@ def _scores(score: PlaceScore, shape: PartShape, places: list[Place]) -> Float[n
     bases = np.stack([compose(rotation_about(_UP, p.yaw), p.position) for p in places])
     floors = np.array([0.0 if p.mount.table else -p.mount.height for p in places])
     on_table = np.array([p.mount.table for p in places])
-    return np.where(~on_table | _stands(shape, bases), score(bases, floors), -1.0)
+    stands = ~on_table | _stands(shape, bases)
+    beside = np.array([p.mount.side_table for p in places])
+    for sign in set(beside[beside != 0]):
+        table = _SIDE_TABLE + np.array(SIDE_TABLE_CENTER) * [1.0, sign, 1.0]
+        stands &= (beside != sign) | score.stays_off(bases, table, _SIDE_TABLE_RADIUS)
+    return np.where(stands, score(bases, floors), -1.0)
 
 
 def _stands(shape: PartShape, bases: Float[np.ndarray, "c 4 4"]) -> Bool[np.ndarray, "c"]:

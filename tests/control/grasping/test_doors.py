@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.baseline import Baseline
+from manipose_mj.control.execution import primitives
+from manipose_mj.control.grasping import part_pick
 from manipose_mj.control.grasping.handle_grasps import (
     Push,
     grip_now,
@@ -16,14 +18,26 @@ from manipose_mj.control.grasping.handle_grasps import (
     shutting_pushes,
 )
 from manipose_mj.control.grasping.part_motion import PartWay, find_way
-from manipose_mj.control.grasping.part_pick import is_a_stage, leads_enough
+from manipose_mj.control.grasping.part_pick import (
+    _closes_on,
+    grip_handle,
+    is_a_stage,
+    leads_enough,
+    way_in_hand,
+)
+from manipose_mj.control.grasping.part_push import push_part
+from manipose_mj.control.grasping.pick import pick_part
+from manipose_mj.control.motion.batch_ik import solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.scene.articulation import joint_motion
+from manipose_mj.control.planning.plan_articulated import OPEN_SHARE, opening_to_pass
+from manipose_mj.control.scene.articulation import joint_motion, with_part_at
 from manipose_mj.control.scene.cavity_mouth import outwards, way_out
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.evaluation.episode import run_episode
+from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, rotation_angle
+from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN
 from manipose_mj.tasks.core.config import EpisodeSpec
 from tests.few_objects import config, load
 
@@ -80,10 +94,46 @@ def test_fingertips_hold_a_bar_by_its_front(scene):
     _, _, part = scene
     front = part.handle.origin + part.handle.rotation[:, 1] * part.handle.extents[1] / 2
     usual = [_before(hold, part, front) for hold in grips(part)]
-    tips = [_before(hold, part, front) for hold in grips(part, fingertips=True)]
+    tips = [_before(hold, part, front) for hold in grips(part, "fingertips")]
     assert tips and min(tips) > max(usual)
     # The pads still overlap the bar.
     assert min(tips) > 0.0 and max(tips) < 0.004
+
+
+def test_knobs_are_held_deeper_in_stages_than_usual(scene):
+    _, _, part = scene
+    handle = replace(part.handle, extents=np.array([0.02, 0.016, 0.02]))
+    knob = replace(part, handle=handle)
+    front = handle.origin + handle.rotation[:, 1] * handle.extents[1] / 2
+    # The middle of a knob is behind its front by half its depth; the usual grips are there or right at its front.
+    usual = {round(_before(hold, knob, front), 6) for hold in grips(knob)}
+    deep = {round(_before(hold, knob, front), 6) for hold in grips(knob, "deep")}
+    assert usual == {-0.008, 0.0}
+    assert deep == {-0.006, -0.004, -0.002}
+    assert not list(grips(part, "deep"))
+
+
+def test_a_long_bar_may_be_held_away_from_its_middle_where_there_is_any_of_it(scene, monkeypatch):
+    planner, estimate, part = scene
+    along = [hold.upright[0, 3] for hold in grips(part, "aside")]
+    usual = [hold.upright[0, 3] for hold in grips(part)]
+    half = part.handle.extents[0] / 2
+    assert min(np.abs(along)) > max(np.abs(usual)) and max(np.abs(along)) < half
+    ways = [
+        way
+        for hold in grips(part, "aside")
+        if (way := _way(scene, hold, part.joint.range[1])) is not None
+    ]
+    assert ways and all(_closes_on(planner, part, way) for way in ways)
+    # A hand's width before it there is nothing.
+    away = solve(planner.backed_off(ways[0].joints[0], 0.05)[None], ways[0].joints[None, :1])[0][0]
+    before = replace(ways[0], joints=np.repeat(away, len(ways[0].joints), axis=0))
+    assert not _closes_on(planner, part, before)
+    # The middle will not do: the grip is one of these.
+    monkeypatch.setattr(part_pick, "_KINDS_IN_STAGES", ("aside",))
+    grip = grip_handle(planner, estimate, part, part.joint.range[1], in_stages=True)
+    tcp = invert(part.handle_pose) @ planner.tcp_pose(grip.approach[-1])
+    assert min(abs(abs(tcp[0, 3]) - abs(slide)) for slide in along) < 2e-3
 
 
 def _before(hold, part: PartEstimate, front: np.ndarray) -> float:
@@ -144,6 +194,77 @@ def test_a_way_that_is_blocked_ends_before_the_obstacle(scene, monkeypatch):
     ways = [_way(scene, hold, high) for hold in list(grips(part))[:2]]
     ends = [way.openings[-1] for way in ways if way is not None]
     assert ends and all(low < end <= at for end in ends)
+
+
+def test_in_stages_a_push_that_leads_part_of_the_way_will_do(scene, monkeypatch):
+    planner, estimate, part = scene
+    low, high = part.joint.range
+    half_open = replace(part, opening=low + 0.6 * (high - low))
+    at_half = planner.within(with_part_at(planner.scene, part, half_open.opening))
+    barrier = low + 0.3 * (high - low)
+    free = PlanningScene.first_collision
+    address = planner.scene.collision_model.joint_address(part.body)
+
+    def collides(self, joints, query=None):
+        opening = self.positions.qpos[address]
+        return ("wall", "arm", -0.01) if opening < barrier else free(self, joints, query)
+
+    monkeypatch.setattr(PlanningScene, "first_collision", collides)
+    with pytest.raises(StageFailure, match="0 of them lead all the way"):
+        push_part(at_half, estimate, half_open, low)
+    push = push_part(at_half, estimate, half_open, low, in_stages=True)
+    assert barrier <= push.way.openings[-1] < half_open.opening - 0.2
+    assert is_a_stage(push.way, half_open)
+
+
+def test_doors_that_fold_back_are_opened_so_far_that_a_hand_passes(scene):
+    _, _, part = scene
+    low, high = part.joint.range
+    assert opening_to_pass(part) == pytest.approx(low + OPEN_SHARE * (high - low))
+    folding = replace(part, joint=replace(part.joint, range=(0.0, np.pi)))
+    assert opening_to_pass(folding) == pytest.approx(WIDE_OPEN)
+
+
+def _refuse(*_arguments, **_options):
+    raise StageFailure("plan", "refused")
+
+
+def test_parts_are_pushed_in_stages_once_no_plan_moves_them_at_once(monkeypatch):
+    calls = []
+
+    def push(*arguments, in_stages: bool):
+        calls.append(in_stages)
+        return push_part(*arguments) if in_stages else _refuse()
+
+    monkeypatch.setattr(primitives, "push_part", push)
+    monkeypatch.setattr(primitives, "pick_part", _refuse)
+    result, _ = run_episode(config("articulated/close_microwave", obs_mode="state"), EpisodeSpec(0))
+    assert result.success_at_end, (result.failure, result.reason)
+    # First all plans without; then again with.
+    assert calls[0] is False and calls[-1] is True
+    assert calls == sorted(calls)
+
+
+def test_in_stages_a_door_without_a_grip_is_pushed_on_from_inside(monkeypatch):
+    """Led ajar it can be gripped no more: the plan's next push goes on from there."""
+    gripped = []
+
+    def pick(*arguments, in_stages: bool):
+        gripped.append(in_stages)
+        return pick_part(*arguments) if len(gripped) == 1 else _refuse()
+
+    def push(*arguments, in_stages: bool):
+        return push_part(*arguments) if in_stages else _refuse()
+
+    def ajar(planner, estimate, part, _):
+        return way_in_hand(planner, estimate, part, part.joint.range[0] + 0.75)
+
+    monkeypatch.setattr(primitives, "pick_part", pick)
+    monkeypatch.setattr(primitives, "push_part", push)
+    monkeypatch.setattr(primitives, "way_in_hand", ajar)
+    result, _ = run_episode(config("articulated/open_microwave", obs_mode="state"), EpisodeSpec(0))
+    assert result.success_at_end, (result.failure, result.reason)
+    assert gripped == [False, True]
 
 
 def test_the_way_out_of_a_cavity_behind_a_door_is_through_its_mouth(scene):

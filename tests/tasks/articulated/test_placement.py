@@ -11,10 +11,12 @@ from dm_control import mjcf
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.control.scene.collision_model import CollisionModel
-from manipose_mj.poses import compose, rotation_about
+from manipose_mj.mjcf.arena import SIDE_TABLE_CENTER, SIDE_TABLE_HALF_EXTENTS
+from manipose_mj.poses import compose, rotation_about, rotation_angle
 from manipose_mj.tasks.articulated import placement
-from manipose_mj.tasks.articulated.part_shape import part_shape
-from manipose_mj.tasks.articulated.place_score import COMPLETE, LAYERS, PlaceScore
+from manipose_mj.tasks.articulated.hand_places import around_the_bar
+from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN, part_motion, part_shape
+from manipose_mj.tasks.articulated.place_score import COMPLETE, LAYERS, TRAVEL, PlaceScore
 from manipose_mj.tasks.articulated.placement import Standing, draw_place, fits_table
 from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.core.start import Mount
@@ -126,3 +128,118 @@ def test_a_start_to_be_shut_is_searched_by_how_far_it_is_open():
     place = draw_place(np.random.RandomState(0), asset, part, 0.8)
     base = compose(rotation_about(_UP, place.yaw), place.position)[None]
     assert PlaceScore(part, shape, LAYERS - 1)(base, np.zeros(1))[0] >= COMPLETE
+
+
+@pytest.fixture
+def few_good_places(monkeypatch):
+    """Only those far to the left are good, which few candidates are; the others are poor. On the floor."""
+
+    def scores(score, shape, places):
+        assert score.shape is shape
+        bearing = [np.arctan2(*place.position[1::-1]) for place in places]
+        return np.where(np.array(bearing) > 1.55, COMPLETE + 0.01, 0.4)
+
+    monkeypatch.setattr(placement, "_scores", scores)
+    monkeypatch.setattr(placement, "_ON_TABLE", (0.1, 0.1, 0.1))
+    placement._good_places.cache_clear()
+    yield
+    placement._good_places.cache_clear()
+
+
+@pytest.mark.usefixtures("few_good_places")
+def test_poor_places_are_drawn_from_no_more_once_there_is_a_good_one():
+    key = placement._Key(*_drawer())
+    places, best = placement._good_places(key, 0, Standing())
+    bearings = [np.arctan2(*place.position[1::-1]) for place in places]
+    assert best > COMPLETE and min(bearings) > 1.55
+    # The first candidates alone have too few of them.
+    rng, usual = np.random.RandomState(0), placement._BATCH * placement._BATCHES
+    shape = part_shape(key.asset, key.part)
+    first = [placement._drawn(rng, key.part, shape, Standing(), False) for _ in range(usual)]
+    good = sum(np.arctan2(*place.position[1::-1]) > 1.55 for place in first)
+    assert 0 < good < placement._ENOUGH <= len(places)
+
+
+@pytest.mark.usefixtures("few_good_places")
+def test_where_no_place_is_good_others_all_around_are_looked_at():
+    key = placement._Key(*_drawer())
+    ahead = Standing(bearing=(-0.1, 0.1), turn=(-0.1, 0.1), objects=True)
+    places, best = placement._good_places(key, 0, ahead)
+    assert best > COMPLETE and all(place.mount.side_table for place in places)
+
+
+def test_a_door_is_not_put_where_it_comes_down_on_the_side_table():
+    asset = catalogue.load("oven", 0)
+    (part,) = (part for part in asset.parts if part.handle is not None)
+    shape = part_shape(asset, part)
+    score = PlaceScore(part, shape)
+    rng = np.random.RandomState(0)
+    beside = Standing(objects=True)
+    drawn = [placement._drawn(rng, part, shape, beside, False) for _ in range(128)]
+    alone = [replace(place, mount=replace(place.mount, side_table=0.0)) for place in drawn]
+    with_table, without = (placement._scores(score, shape, places) for places in (drawn, alone))
+    refused = (with_table < 0) & (without >= 0)
+    assert refused.any() and (with_table[~refused] == without[~refused]).all()
+    openings = np.linspace(*part.joint.range, LAYERS)
+    for place in np.array(drawn, object)[refused]:
+        top = np.array(SIDE_TABLE_CENTER) * [1.0, place.mount.side_table, 1.0]
+        base = compose(rotation_about(_UP, place.yaw), place.position)
+        boxes = [(base, box) for box in shape.fixed]
+        boxes += [(base @ part_motion(part, q), shape.moving) for q in openings]
+        near = np.array([0.1, 0.1, 0.1]) + SIDE_TABLE_HALF_EXTENTS
+        assert any(_overlap(pose, box, top, near) for pose, box in boxes)
+
+
+def _overlap(pose, box, middle, half) -> bool:
+    """Whether any of many points of a box is within half extents of a point."""
+    shares = np.stack(np.meshgrid(*[np.linspace(0, 1, 9)] * 3), axis=-1).reshape(-1, 3)
+    points = (box[0] + shares * (box[1] - box[0])) @ pose[:3, :3].T + pose[:3, 3]
+    return bool((np.abs(points - middle) < half).all(axis=1).any())
+
+
+def test_a_door_that_cannot_be_shut_from_wide_open_starts_no_wider_than_was_looked_at(monkeypatch):
+    asset, part = _drawer()
+    monkeypatch.setattr(placement, "_good_places", lambda *_: ((), 0.2))
+    looked_at = TRAVEL * np.linspace(0, 1, LAYERS)[LAYERS // 2]
+    assert placement.widest_start(asset, part) == pytest.approx(looked_at)
+
+
+def test_a_door_that_folds_back_need_be_open_only_so_far_that_a_hand_passes():
+    asset = catalogue.load("microwave", 0)
+    part = asset.part("door")
+    shape = part_shape(asset, part)
+    folding = replace(part, joint=replace(part.joint, range=(0.0, np.pi)))
+    far = PlaceScore(folding, shape)._motions()[-1]
+    enough = PlaceScore(folding, shape, back=True)._motions()[-1]
+    assert rotation_angle(far[:3, :3], np.eye(3)) == pytest.approx(TRAVEL * np.pi)
+    assert rotation_angle(enough[:3, :3], np.eye(3)) == pytest.approx(WIDE_OPEN)
+
+
+def test_fingertips_need_less_room_behind_a_handle():
+    asset = catalogue.load("cabinet", 0)
+    part = asset.part("top_drawer")
+    usual, tips = (
+        around_the_bar(part, fingertips=fingertips)[0].poses for fingertips in (False, True)
+    )
+    out = part.handle.rotation[:, 1]
+    further = (tips[:, :3, 3] - usual[:, :3, 3]) @ out
+    assert (further > 0).all()
+    # A wall right behind the handle leaves room for the tips alone.
+    front = float(part.handle.origin @ out) + part.handle.extents[1] / 2
+    shape = part_shape(asset, part)
+    axis = int(np.abs(out).argmax())
+    wall = shape.moving.copy()
+    wall[int(out[axis] > 0), axis] = out[axis] * (front - 0.009)
+    close = replace(shape, moving=wall)
+    base = _good_base(asset, part)
+    scores = [
+        PlaceScore(part, close, fingertips=fingertips)(base, np.full(len(base), -2.0)).max()
+        for fingertips in (False, True)
+    ]
+    assert scores[0] < 0.5 < scores[1]
+
+
+def _good_base(asset, part) -> np.ndarray:
+    """Where the part can be opened, `(n, 4, 4)`."""
+    places = [draw_place(np.random.RandomState(seed), asset, part) for seed in range(8)]
+    return np.stack([compose(rotation_about(_UP, place.yaw), place.position) for place in places])

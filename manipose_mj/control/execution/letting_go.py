@@ -1,0 +1,63 @@
+"""Letting go of what the hand holds: how far to open, and a way back from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.control.grasping.candidates import OPENING_MARGIN
+from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
+from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.scene_estimate import SceneEstimate
+from manipose_mj.failures import StageFailure
+from manipose_mj.mjcf.panda.robot import MAX_OPENING
+
+# How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
+_LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
+_UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
+_GIVING_WAY = (0.006, 0.012)
+
+
+def opening_to_let_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
+    """How far to open [m]: as far as neighbours allow."""
+    released = estimate.parts.get(name) or estimate.objects[name]
+    margins = _LETTING_GO
+    query = CollisionQuery(replace(CONTACT, arm=0.0), target=released.geoms)
+    if name in estimate.objects and estimate.objects[name].uncertainty > 0:
+        # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
+        margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
+        query = planner.excusing(estimate.joints, query)
+    for margin in margins:
+        opening = min(estimate.opening + margin, MAX_OPENING)
+        if not planner.collides(estimate.joints, replace(query, opening=opening)):
+            return opening
+    return min(estimate.opening + _LETTING_GO[0], MAX_OPENING)
+
+
+def retreat_from(
+    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
+) -> Float[np.ndarray, "t 7"]:
+    """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
+
+    Args:
+      planner: Plans in the scene of the estimate.
+      estimate: What is where.
+      name: Of what was let go.
+      near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
+
+    Raises:
+      StageFailure: There is no way.
+    """
+    released = estimate.parts.get(name) or estimate.objects[name]
+    distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
+    touched = frozenset({planner.body_name(released.body)})
+    for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
+        pushing = planner.allowing(max(allowance, planner.contact_allowance))
+        line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
+        if line is not None:
+            return line
+    raise StageFailure("release", f"no way to back off from {name}")
