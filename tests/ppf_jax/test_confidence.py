@@ -44,7 +44,7 @@ def bottle() -> np.ndarray:
 def test_what_looks_alike_upside_down_has_little_confidence_and_poses_stay(can, bottle):
     estimator, key = PoseEstimator.load("axial"), jax.random.key(0)
     unsure, sure = (estimator.estimate(points, key=key) for points in (can, bottle))
-    assert unsure.confidence < 0.6 < 0.85 < sure.confidence
+    assert unsure.confidence < 0.6 < 0.75 < sure.confidence
     plain = replace(estimator, calibration=None).estimate(can, key=key)
     np.testing.assert_array_equal(unsure.pose, plain.pose)
     assert unsure.confidence != plain.confidence
@@ -74,7 +74,7 @@ def test_rivals_have_at_most_what_the_best_leaves():
 def test_many_at_once_are_calibrated_as_well(can, bottle):
     estimator = PoseEstimator.load("axial")
     unsure, sure = estimator.estimate_many([can, bottle], key=jax.random.key(0))
-    assert unsure.confidence < 0.6 < 0.85 < sure.confidence
+    assert unsure.confidence < 0.6 < 0.75 < sure.confidence
 
 
 def test_a_calibration_is_read_as_it_was_written(tmp_path):

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
 
+from manipose_mj.assets import catalogue
+from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated.body_frame import BODY_IN_LABEL
+from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes
 from manipose_mj.ppf_jax.data.articulated.cache import (
     furniture_scenes,
     furniture_stream,
@@ -63,8 +69,11 @@ def test_batches_are_the_same_whoever_makes_them(tmp_path, monkeypatch):
     monkeypatch.setenv("MANIPOSE_CACHE", str(tmp_path))
     objects = [("microwave", 0)]
     scenes = furniture_scenes(objects, "training", scenes=2)
-    alone = furniture_stream(scenes, 2, seed=3)(5)
-    helped = parallel_furniture_stream(objects, "training", scenes=2, batch=2, seed=3, jobs=2)(5)
+    others = [replace(scene, name=f"built/{i}") for i, scene in enumerate(scenes)]
+    alone = furniture_stream([*scenes, *others], 2, seed=3)(5)
+    helped = parallel_furniture_stream(
+        objects, "training", scenes=2, batch=2, seed=3, jobs=2, others=others
+    )(5)
     for _ in range(9):  # more than are made ahead
         jax.tree.map(np.testing.assert_array_equal, next(alone), next(helped))
 
@@ -74,3 +83,16 @@ def test_body_columns_are_front_up_and_side(cabinet):
     np.testing.assert_allclose(rotation[:, 0], [-1, 0, 0], atol=1e-6)
     np.testing.assert_allclose(rotation[:, 1], [0, 0, 1], atol=1e-6)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_scenes_of_built_furniture_are_of_the_named_pieces(tmp_path):
+    for name in ("microwave_000", "microwave_001"):
+        shutil.copytree(catalogue.load_by_name(name).folder, tmp_path / name)
+    (named,) = {
+        s.name.split("/")[0]
+        for s in asset_scenes(tmp_path, "front", scenes=1, only=["microwave_001"])
+    }
+    assert named == "microwave_001"
+    assert len(asset_scenes(tmp_path, "front", scenes=1)) == 2
+    with pytest.raises(InputError, match="did you mean microwave_001"):
+        asset_scenes(tmp_path, "front", scenes=1, only=["microwave_01"])
