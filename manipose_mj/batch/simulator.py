@@ -116,12 +116,13 @@ class Simulator:
             servos = self._servos[group] = ServoGroup([world.servos for world in worlds])
         servos.read_set_points()
         pairs = [(world.model, world.data) for world in worlds]
+        first_half, second_half = mujoco.mj_step1, mujoco.mj_step2
         for substep in range(targets.shape[1]):
             servos.follow(targets[:, substep])
             for model, data in pairs:
                 # The second half of a step, then the first of the next, as the CPU's environment steps.
-                mujoco.mj_step2(model, data)
-                mujoco.mj_step1(model, data)
+                second_half(model, data)
+                first_half(model, data)
 
 
 def state_words(pool: StartPool) -> int:
