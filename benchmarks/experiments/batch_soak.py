@@ -151,9 +151,7 @@ def _chunk(worlds: batch.Worlds, state: batch.State, key: Array) -> tuple[batch.
     lower, upper = jnp.asarray(worlds.lower), jnp.asarray(worlds.upper)
 
     def hold(state: batch.State, key: Array) -> tuple[batch.State, Array]:
-        action = jax.random.uniform(
-            key, (worlds.count, len(lower)), minval=lower, maxval=upper
-        )
+        action = jax.random.uniform(key, (worlds.count, len(lower)), minval=lower, maxval=upper)
 
         def step(state: batch.State, _: None) -> tuple[batch.State, Array]:
             after = worlds.step(state, action)

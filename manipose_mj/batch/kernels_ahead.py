@@ -78,7 +78,9 @@ def begin_compiling(make: Callable[..., object], arguments: Any, arch: int) -> C
     Returns:
       What to wait for; None where there is too little to do, or one core.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     missing = [one for one in launches(make, arguments) if not _compiled(one, arch)]
     if cores < 2 or len(missing) < _FEWEST:
         return None

@@ -95,9 +95,7 @@ class Simulator:
 
     def _begin(self, number: int, row: int) -> None:
         """Give a world new data, of another start."""
-        self._worlds[number] = _World(
-            self._models.at(row), self._pool.starts[row].addresses.servos
-        )
+        self._worlds[number] = _World(self._models.at(row), self._pool.starts[row].addresses.servos)
         self._rows[number] = row
         self._words[number] = 0
         self._servos[number // _GROUP] = None
