@@ -115,7 +115,7 @@ def device_memory(worlds: batch.Worlds) -> float:
     """In use on the GPU by everyone [bytes]; 0 without one."""
     if worlds.engine.name != "warp":
         return 0.0
-    import warp as wp
+    import warp as wp  # pyright: ignore[reportMissingImports]
 
     device = wp.device_from_jax(jax.devices()[0])
     return float(device.total_memory - device.free_memory) if device.is_cuda else 0.0

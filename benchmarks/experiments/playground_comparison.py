@@ -131,7 +131,9 @@ def ours(count: int, objects: Sequence[str], steps: int, engine: Any = "warp") -
 def playground(count: int, mode: str | None, steps: int) -> Runner:
     """`PandaPickCube` with our physics steps; mode: of graphs, with room for all; None: its default configuration."""
     from mujoco import mjx
-    from mujoco_playground._src.manipulation.franka_emika_panda import pick
+    from mujoco_playground._src.manipulation.franka_emika_panda import (  # pyright: ignore[reportMissingImports]
+        pick,
+    )
 
     config = {"sim_dt": PHYSICS_STEP, "ctrl_dt": PHYSICS_STEP * SUBSTEPS}
     if mode is not None:
@@ -139,7 +141,7 @@ def playground(count: int, mode: str | None, steps: int) -> Runner:
         config |= {"naconmax": room, "naccdmax": room, "njmax": ROWS}
     environment = pick.PandaPickCube(config_overrides=config)
     if mode is not None:
-        import warp as wp
+        import warp as wp  # pyright: ignore[reportMissingImports]
 
         environment._mjx_model = mjx.put_model(
             environment.mj_model, impl="warp", graph_mode=getattr(wp.JaxCallableGraphMode, mode)

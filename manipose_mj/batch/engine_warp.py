@@ -89,7 +89,7 @@ class WarpEngine:
         if compiling is not None:
             compiling.wait()
         self._warm_up()
-        self._call = None if dry else self._compiled()
+        self._call: Any = None if dry else self._compiled()
 
     def _made(self, model: mujoco.MjModel, worlds: int) -> Any:
         """Data of so many worlds, each with its share of the room."""

@@ -80,7 +80,7 @@ class Simulator:
             world.state.read_into(flat)
         measured = self._measurer.measure([w.data for w in worlds], [w.read for w in worlds], rows)
         warnings = np.array([world.warnings for world in worlds])
-        diverged = warnings[:, _DIVERGED].any(axis=1)
+        diverged = np.asarray(warnings[:, _DIVERGED].any(axis=1))
         for i in np.flatnonzero(diverged).tolist():
             self._rows[i] = -1
             states[i] = 0
