@@ -84,8 +84,8 @@ def probe(pool: StartPool) -> Peaks:
     pool = replace(pool, scenes=tuple(awake(scene) for scene in pool.scenes))
     counter = _Counter(pool)
     rows = counter.spread(min(PROBED, len(pool.starts)))
-    starts, worlds = [pool.starts[row] for row in rows], range(len(rows))
-    simulator, size = Simulator(pool), state_words(pool)
+    starts = [pool.starts[row] for row in rows]
+    simulator, size = Simulator(pool, len(rows)), state_words(pool)
     first = np.stack([packed(start.simulation, size) for start in starts])
     words, rng = first.copy(), np.random.default_rng(pool.seeds)
     down = [start.measurement.tcp_rotation for start in starts]
@@ -93,7 +93,8 @@ def probe(pool: StartPool) -> Peaks:
     peaks = np.stack([counter.begun[row] for row in rows])
     for step in range(sum(_PHASES) + _DRAWN_TARGETS * _HELD):
         held = np.repeat(targets[:, None], pool.layout.substeps, axis=1)
-        words, diverged, now = simulator.advance(worlds, words, rows, held)
+        words, diverged, measured = simulator.advance(words, rows, held)
+        now = measured.split(starts[0].measurement)
         words[diverged] = first[diverged]
         for world in np.flatnonzero(~diverged).tolist():
             model, data = simulator.held(world)

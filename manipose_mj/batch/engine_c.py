@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
-from functools import partial
 from multiprocessing import get_context
 
 import jax
@@ -13,7 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from manipose_mj.batch.measurement import Measurement
+from manipose_mj.batch.measurement import FlatMeasurement, Measurement, flat_values
 from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.simulator import Simulator, packed, state_words
 from manipose_mj.batch.starts import StartPool
@@ -25,7 +24,7 @@ from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 _simulator: Simulator | None = None  # of a worker's process
 
 Words = UInt32[np.ndarray, "worlds words"]
-Advanced = tuple[Words, Bool[np.ndarray, " worlds"], Measurement]
+Advanced = tuple[Words, Bool[np.ndarray, " worlds"], FlatMeasurement]
 
 
 class CEngine:
@@ -50,30 +49,27 @@ class CEngine:
         processes = min(processes, worlds)
         bounds = np.linspace(0, worlds, processes + 1).astype(int)
         self._chunks = [range(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        self._local = Simulator(pool) if processes == 1 else None
+        self._local = Simulator(pool, worlds) if processes == 1 else None
         self._workers: list[ProcessPoolExecutor] = []
         if self._local is None:
             # One executor a process: a world stays with the process that has its data.
-            make = partial(
-                ProcessPoolExecutor,
-                max_workers=1,
-                mp_context=get_context("spawn"),
-                initializer=_begin,
-                initargs=(pool,),
-            )
-            self._workers = [make() for _ in self._chunks]
-        measurement = pool.starts[0].measurement
-        words = state_words(pool)
-        self._shapes = (
-            jax.ShapeDtypeStruct((worlds, words), jnp.uint32),
-            jax.ShapeDtypeStruct((worlds,), jnp.bool_),
-            Measurement(
-                *(
-                    jax.ShapeDtypeStruct(
-                        (worlds, *field.shape), field.dtype if field.dtype == bool else jnp.float32
-                    )
-                    for field in measurement
+            self._workers = [
+                ProcessPoolExecutor(
+                    max_workers=1,
+                    mp_context=get_context("spawn"),
+                    initializer=_begin,
+                    initargs=(pool, len(chunk)),
                 )
+                for chunk in self._chunks
+            ]
+        self._one = pool.starts[0].measurement
+        shapes = jax.ShapeDtypeStruct
+        self._shapes = (
+            shapes((worlds, state_words(pool)), jnp.uint32),
+            shapes((worlds,), jnp.bool_),
+            FlatMeasurement(
+                shapes((worlds, len(flat_values(self._one))), jnp.float32),
+                shapes((worlds, *self._one.contacts.shape), jnp.bool_),
             ),
         )
 
@@ -87,7 +83,10 @@ class CEngine:
         rows: Int[Array, " worlds"],
         targets: Float[Array, "worlds substeps 8"],
     ) -> tuple[UInt32[Array, "worlds words"], Bool[Array, " worlds"], Measurement]:
-        return jax.pure_callback(self._advance, self._shapes, physics, rows, targets)
+        after, diverged, measured = jax.pure_callback(
+            self._advance, self._shapes, physics, rows, targets
+        )
+        return after, diverged, measured.split(self._one)
 
     def overflowed(self, physics: UInt32[Array, "worlds words"]) -> Bool[Array, " worlds"]:
         return jnp.zeros(len(physics), bool)
@@ -136,11 +135,9 @@ class CEngine:
         words, rows = np.asarray(physics), np.asarray(rows)
         targets = np.asarray(targets, float)
         if self._local is not None:
-            return _single(self._local.advance(self._chunks[0], words, rows, targets))
+            return _single(self._local.advance(words, rows, targets))
         waiting: list[Future[Advanced]] = [
-            worker.submit(
-                _step, chunk, *(a[chunk.start : chunk.stop] for a in (words, rows, targets))
-            )
+            worker.submit(_step, *(a[chunk.start : chunk.stop] for a in (words, rows, targets)))
             for worker, chunk in zip(self._workers, self._chunks, strict=True)
         ]
         parts = [future.result() for future in waiting]
@@ -150,18 +147,14 @@ class CEngine:
 def _single(advanced: Advanced) -> Advanced:
     """Measurements in the precision that JAX has."""
     words, diverged, measured = advanced
-    return words, diverged, Measurement(*map(_as_single, measured))
+    return words, diverged, measured._replace(values=measured.values.astype(np.float32))
 
 
-def _as_single(field: np.ndarray) -> np.ndarray:
-    return field if field.dtype == bool else field.astype(np.float32)
-
-
-def _begin(pool: StartPool) -> None:
+def _begin(pool: StartPool, worlds: int) -> None:
     global _simulator
-    _simulator = Simulator(pool)
+    _simulator = Simulator(pool, worlds)
 
 
-def _step(chunk: range, words: Words, rows: np.ndarray, targets: np.ndarray) -> Advanced:
+def _step(words: Words, rows: np.ndarray, targets: np.ndarray) -> Advanced:
     assert _simulator is not None
-    return _single(_simulator.advance(chunk, words, rows, targets))
+    return _single(_simulator.advance(words, rows, targets))

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch import warp_kernels as kernels
 from manipose_mj.batch.capacity import Capacity, probe
+from manipose_mj.batch.kernels_ahead import begin_compiling
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.render_warp import WarpRenderer
 from manipose_mj.batch.row_fields import RowFields
@@ -28,6 +29,7 @@ Physics = dict[str, Array]
 _FASTEST = 1e3  # nothing in a scene moves at this speed [m/s, rad/s]; what does has diverged
 # Captured steps hold several times what the data do (measured: 3.2 and 3.9 times).
 _SCRATCH = 4
+_DRY_CONTACTS, _DRY_CONSTRAINTS = 64, 400  # room that nothing is computed in
 _MOVING = ("qpos", "qvel", "ctrl", "qacc_warmstart")  # the state of a world
 # What measurements are made of, as MuJoCo's data have them.
 _READ = ("xpos", "xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "actuator_force")
@@ -48,6 +50,7 @@ class WarpEngine:
         capacity: Capacity | None = None,
         *,
         visual: bool = False,
+        dry: bool = False,
     ) -> None:
         """Copies the model to the device and compiles the kernels.
 
@@ -56,6 +59,7 @@ class WarpEngine:
           worlds: How many there are.
           capacity: Room for contacts and constraints; None: from a `probe` of the pool.
           visual: Whether cameras shall see the objects and furniture of several scenes.
+          dry: Launch what a step launches and no more, to find out what it is.
 
         Raises:
           InputError: The pool has several scenes that no model can stand for, or the device has too little memory.
@@ -64,8 +68,12 @@ class WarpEngine:
         self._fields = RowFields(pool, visual=visual)
         self._visual = visual or len(pool.scenes) == 1
         model = self._fields.model
-        self.capacity = capacity or probe(pool).capacity(worlds)
         self._device = wp.device_from_jax(jax.devices()[0])
+        compiling = None
+        if self._device.is_cuda and not dry:
+            # One kernel depends on the room: it is compiled below.
+            compiling = begin_compiling(dry_engine, (pool, visual), self._device.arch)
+        self.capacity = capacity or probe(pool).capacity(worlds)
         with wp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)
             self._model.opt.warn_overflow = 0  # it is reported, not printed
@@ -78,7 +86,10 @@ class WarpEngine:
             self._owners = wp.array(self._fields.owners, dtype=int)
         self._owned = len(pool.layout.objects) + len(pool.layout.parts)
         self._addresses = jax.tree.map(jnp.asarray, self._fields.addresses)
-        self._call = self._compiled(model)
+        if compiling is not None:
+            compiling.wait()
+        self._warm_up()
+        self._call: Any = None if dry else self._compiled()
 
     def _made(self, model: mujoco.MjModel, worlds: int) -> Any:
         """Data of so many worlds, each with its share of the room."""
@@ -243,7 +254,7 @@ class WarpEngine:
             outputs=[diverged],
         )
 
-    def _compiled(self, model: mujoco.MjModel) -> Any:
+    def _compiled(self) -> Any:
         """The control step as a function that JAX can call."""
         data = self._data
 
@@ -281,7 +292,6 @@ class WarpEngine:
                 wp.copy(out, getattr(data, name))
             wp.copy(overflow, data.overflow)
 
-        self._warm_up()
         n = self._worlds
         dims = {
             **{f"{name}_after": getattr(data, name).shape for name in _MOVING},
@@ -312,6 +322,11 @@ class WarpEngine:
             contacts = wp.zeros((self._worlds, 3 * self._owned), dtype=int)
             self._read(rows, contacts, wp.zeros(self._worlds, dtype=int))
             wp.synchronize_device()
+
+
+def dry_engine(pool: StartPool, visual: bool) -> WarpEngine:
+    """One world, for `kernels_ahead`: its kernels are those of many."""
+    return WarpEngine(pool, 1, Capacity(_DRY_CONTACTS, _DRY_CONSTRAINTS), visual=visual, dry=True)
 
 
 def _size(data: Any) -> int:

@@ -7,7 +7,7 @@ slots: those that the goals may name, in one order for all worlds.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -70,15 +70,53 @@ class Addresses:
     cameras: Int[np.ndarray, " cameras"]
 
 
+class FlatMeasurement(NamedTuple):
+    """Attributes: values, all of a `Measurement` but contacts, one field after the other; contacts."""
+
+    values: Float[Array, "*b n"]
+    contacts: Bool[Array, "*b 3 owned"]
+
+    def split(self, like: Measurement) -> Measurement:
+        """With a field for each quantity; like: any measurement of one world."""
+        fields, place = {}, 0
+        for name, one in zip(Measurement._fields, like, strict=True):
+            if name == "contacts":
+                continue
+            own = self.values[..., place : place + one.size]
+            fields[name] = own.reshape(*own.shape[:-1], *one.shape)
+            place += one.size
+        return Measurement(**fields, contacts=self.contacts)
+
+
+def flat_values(measurement: Measurement) -> np.ndarray:
+    """Of one world, the values of a `FlatMeasurement`."""
+    fields = measurement._asdict()
+    del fields["contacts"]
+    return np.concatenate([np.reshape(field, -1) for field in fields.values()])
+
+
 def measure(model: mujoco.MjModel, data: mujoco.MjData, at: Addresses) -> Measurement:
     """A measurement of one simulation, whose kinematics and contacts are up to date."""
-    servos = at.servos
     contacts = np.zeros((_ROBOT_KINDS, len(at.dofs) + len(at.openings)), bool)
     if data.ncon:
-        owners = at.owners[data.contact.geom]
-        owners = np.sort(owners, axis=-1)
-        kinds, owned = owners[(owners[:, 0] <= RIGHT_PAD) & (owners[:, 1] >= FIRST)].T
-        contacts[kinds, owned - FIRST] = True
+        kinds, owned, _ = touching(at.owners[data.contact.geom])
+        contacts[kinds, owned] = True
+    return gathered(data, at, contacts)
+
+
+def touching(
+    owners: Int[np.ndarray, "contacts 2"],
+) -> tuple[Int[np.ndarray, " some"], Int[np.ndarray, " some"], Int[np.ndarray, " some"]]:
+    """Of contacts of the robot with something owned: its kind of geom, the slot, and which contacts they are."""
+    owners = np.sort(owners, axis=-1)
+    which = np.flatnonzero((owners[:, 0] <= RIGHT_PAD) & (owners[:, 1] >= FIRST))
+    kinds, slots = owners[which].T
+    return kinds, slots - FIRST, which
+
+
+def gathered(data: Any, at: Addresses, contacts: Bool[np.ndarray, "3 owned"]) -> Measurement:
+    """What a measurement takes from arrays named and shaped as MuJoCo's."""
+    servos = at.servos
     return Measurement(
         joints=data.qpos[servos.angles],
         velocities=data.qvel[servos.dofs],

@@ -83,6 +83,17 @@ class Transition(NamedTuple):
     overflowed: Bool[Array, "*steps worlds"]
 
 
+class _Unseen(NamedTuple):
+    """A state whose observations are still to be made, and what those after the last step are of.
+
+    Attributes: state, without observations; ended, the measurement after the step; ended_row, the starts in it.
+    """
+
+    state: State
+    ended: Measurement
+    ended_row: Int[Array, " worlds"]
+
+
 class Worlds:
     """Worlds of one task on one engine.
 
@@ -102,9 +113,9 @@ class Worlds:
         self._simulations = engine.starts()
         self._observer, self._controller = Observer(pool), Controller(pool)
         self.lower, self.upper = self._controller.lower, self._controller.upper
-        self._begin_jit, self._step_jit = (
-            jax.jit(self._begin),
-            jax.jit(self._step, static_argnums=2),
+        self._begin_jit = jax.jit(self._begin)
+        self._step_jit, self._unseen_jit = (
+            jax.jit(step, static_argnums=2) for step in (self._step, self._unseen_step)
         )
 
     def reset(self, key: PRNGKeyArray) -> State:
@@ -164,31 +175,21 @@ class Worlds:
                 raise InputError("a rollout of a policy needs the number of steps")
             keys = jax.random.split(jax.random.key(0) if key is None else key, steps)
 
-            def act(state: State, own: Array) -> Array:
-                return policy(state.observation, own)
+            def act_and_step(state: State, own: Array) -> tuple[State, Transition]:
+                action = policy(state.observation, own)
+                after = self._step_jit(state, action, 1)
+                return after, _transition(action, after)
 
-            inputs = keys
-        else:
+            return jax.lax.scan(act_and_step, state, keys)
 
-            def act(state: State, own: Array) -> Array:
-                return own
+        def step(going: _Unseen, action: Array) -> tuple[_Unseen, Transition]:
+            after = self._unseen_jit(going.state, action, 1)
+            return after, _transition(action, after.state)
 
-            inputs = jnp.asarray(policy)[:steps]
-
-        def one(state: State, own: Array) -> tuple[State, Transition]:
-            action = act(state, own)
-            after = self._step_jit(state, action, 1)
-            return after, Transition(
-                action,
-                after.reward,
-                after.terminated,
-                after.truncated,
-                after.success,
-                after.success_once,
-                after.overflowed,
-            )
-
-        return jax.lax.scan(one, state, inputs)
+        # Nobody looks before the last step.
+        blind = _Unseen(_without_observations(state), state.measurement, state.row)
+        last, seen = jax.lax.scan(step, blind, jnp.asarray(policy)[:steps])
+        return (self._seen(last) if len(seen.reward) else state), seen
 
     def seeds(self, state: State) -> Int[np.ndarray, " worlds"]:
         """Of the present episodes."""
@@ -236,13 +237,17 @@ class Worlds:
         }
 
     def _begin(self, rows: Int[Array, " worlds"]) -> State:
+        begun = self._unseen_begin(rows)
+        return self._seen(_Unseen(begun, begun.measurement, begun.row))
+
+    def _unseen_begin(self, rows: Int[Array, " worlds"]) -> State:
+        """Without observations."""
         rows = rows.astype(jnp.int32)
         now = take(self._measurements, rows)
-        observation = self._observer.observe(now, rows)
         never = jnp.zeros(len(rows), bool)
         return State(
-            observation=observation,
-            final_observation=observation,
+            observation={},
+            final_observation={},
             reward=jnp.zeros(len(rows), jnp.float32),
             terminated=never,
             truncated=never,
@@ -259,6 +264,19 @@ class Worlds:
         )
 
     def _step(self, state: State, action: Float[Array, "worlds n"], hold: int) -> State:
+        return self._seen(self._unseen_step(_without_observations(state), action, hold))
+
+    def _seen(self, unseen: _Unseen) -> State:
+        """With observations."""
+        state = unseen.state
+        final = self._observer.observe(unseen.ended, unseen.ended_row)
+        first = self._observer.observe(state.measurement, state.row)
+        return state._replace(
+            observation=_choose(state.done, first, final), final_observation=final
+        )
+
+    def _unseen_step(self, state: State, action: Float[Array, "worlds n"], hold: int) -> _Unseen:
+        """One control step of states without observations."""
         layout, rows = self.pool.layout, state.row
         action = jnp.asarray(action, jnp.float32)
         valid = jnp.isfinite(action).all(-1)
@@ -276,13 +294,10 @@ class Worlds:
             going_on, _ = jax.lax.scan(held, going_on, length=hold - 1)
         diverged = going_on.terminated
         truncated = (going_on.count >= layout.horizon) & ~diverged
-        observation = self._observer.observe(going_on.measurement, rows)
         done = diverged | truncated
         # Where no episode ended, rows are read that are not used: a gather costs less than a branch.
-        fresh = self._begin(jnp.where(done, (rows + 1) % len(self.pool.starts), rows))
-        return going_on._replace(
-            observation=_choose(done, fresh.observation, observation),
-            final_observation=observation,
+        fresh = self._unseen_begin(jnp.where(done, (rows + 1) % len(self.pool.starts), rows))
+        after = going_on._replace(
             reward=jnp.where(diverged, 0.0, going_on.reward).astype(jnp.float32),
             truncated=truncated,
             success_once=going_on.succeeded,
@@ -295,6 +310,7 @@ class Worlds:
             measurement=_choose(done, fresh.measurement, going_on.measurement),
             commands=_choose(done, fresh.commands, going_on.commands),
         )
+        return _Unseen(after, going_on.measurement, rows)
 
     def _advanced(self, state: State, targets: Float[Array, "worlds substeps 8"]) -> State:
         """One control step later, before anything begins anew; `terminated` says which diverged so far."""
@@ -314,6 +330,22 @@ class Worlds:
             simulation=simulation,
             measurement=now,
         )
+
+
+def _without_observations(state: State) -> State:
+    return state._replace(observation={}, final_observation={})
+
+
+def _transition(action: Array, after: State) -> Transition:
+    return Transition(
+        action,
+        after.reward,
+        after.terminated,
+        after.truncated,
+        after.success,
+        after.success_once,
+        after.overflowed,
+    )
 
 
 def _choose(which: Bool[Array, " worlds"], yes: Any, no: Any) -> Any:

@@ -26,6 +26,8 @@ TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
 # The TCP is never further than this from each joint's axis [m].
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
 _REACH = np.cumsum(_LINKS[::-1])[::-1]
+# A column of the Jacobian of the TCP changes by at most the shorter of two levers as another joint turns [m/rad].
+_CHANGE = np.minimum.outer(_REACH, _REACH)
 
 
 @lru_cache(maxsize=8)
@@ -79,3 +81,15 @@ def allowed_for_joints(
 def tcp_surely_slow(leads: Float[np.ndarray, "*b 7"]) -> Bool[np.ndarray, "*b"]:
     """Whether set-points so far ahead of the joints [rad] cannot drive the TCP too fast, however the arm is bent."""
     return np.abs(leads) @ _REACH < (1 - 1e-9) * TCP_LEAD
+
+
+def tcp_motion_change(
+    leads: Float[np.ndarray, "*b 7"], turned: Float[np.ndarray, "*b 7"]
+) -> Float[np.ndarray, "*b"]:
+    """By how much the TCP's motion for such leads can change as the joints turn [m], at most.
+
+    Args:
+      leads: Set-points' ahead of the joints [rad].
+      turned: By how much the joints turn [rad].
+    """
+    return ((np.abs(turned) @ _CHANGE) * np.abs(leads)).sum(axis=-1)

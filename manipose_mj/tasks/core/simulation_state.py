@@ -64,6 +64,27 @@ def read_simulation(model: mujoco.MjModel, data: mujoco.MjData) -> SimulationSta
     )
 
 
+class FlatReader:
+    """Reads one simulation again and again, as `read_simulation(...).flat()` does, from views made once."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._model, self._data = model, data
+        self._size = state_size(model)
+        self._counts = np.empty(len(_AWAKE_COUNTS))
+        asleep, left = (
+            [getattr(data, name).reshape(-1) for name in names] for names in (_ASLEEP, _LEFT_BEHIND)
+        )
+        self._rest = [*asleep, self._counts, *left]
+        self._end = self._size + sum(map(len, self._rest))
+
+    def read_into(self, flat: Float[np.ndarray, "m"]) -> None:
+        """Write the present into an array; what is longer than the model needs stays as it is."""
+        data = self._data
+        mujoco.mj_getState(self._model, data, flat[: self._size], _STATE)
+        self._counts[:] = data.ntree_awake, data.nbody_awake, data.nparent_awake, data.nv_awake
+        np.concatenate(self._rest, out=flat[self._size : self._end])
+
+
 def unflatten(
     model: mujoco.MjModel, data: mujoco.MjData, flat: Float[np.ndarray, "m"]
 ) -> SimulationState:

@@ -8,7 +8,8 @@ from dm_control import mjcf
 
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, Panda
-from manipose_mj.mjcf.panda.servos import Servos, follow_together
+from manipose_mj.mjcf.panda.servos import ServoGroup, Servos
+from manipose_mj.mjcf.panda.speed_limits import TCP_LEAD
 
 ROBOTS = 60
 
@@ -34,10 +35,13 @@ def test_robots_follow_together_bit_for_bit():
     targets = np.concatenate(
         [HOME + rng.normal(0, 1.0, (ROBOTS, 7)), rng.uniform(-0.02, 0.1, (ROBOTS, 1))], axis=1
     )
-    follow_together([together for together, _ in pairs], targets)
+    group = ServoGroup([together for together, _ in pairs])
+    group.read_set_points()
+    group.follow(targets)
     for (together, alone), target in zip(pairs, targets, strict=True):
         alone.follow(target)
         np.testing.assert_array_equal(together.control, alone.control)
         assert together.opening[0] == alone.opening[0]
-        slowed += not together.tcp_slow(alone.control - alone.joint_angles)
+        lead = together.tcp_jacobian() @ (alone.control - alone.joint_angles)
+        slowed += bool(np.linalg.norm(lead) > 0.999 * TCP_LEAD)
     assert 0 < slowed < ROBOTS
