@@ -13,9 +13,9 @@ import warp as wp  # pyright: ignore[reportMissingImports]
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.franka_hand import MAX_OPENING
-from manipose_mj.batch import warp_kernels as kernels
 from manipose_mj.batch.capacity import Capacity, probe
-from manipose_mj.batch.kernels_ahead import begin_compiling
+from manipose_mj.batch.kernels import warp_kernels as kernels
+from manipose_mj.batch.kernels.kernels_ahead import begin_compiling
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.render_warp import WarpRenderer
 from manipose_mj.batch.row_fields import RowFields

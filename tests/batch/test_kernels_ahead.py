@@ -8,7 +8,7 @@ import pytest
 
 wp = pytest.importorskip("warp", reason='needs pip install "manipose-mj[gpu]"')
 
-from manipose_mj.batch import kernels_ahead  # noqa: E402
+from manipose_mj.batch.kernels import kernels_ahead  # noqa: E402
 from tests.batch import small_kernels  # noqa: E402
 
 

@@ -1,6 +1,6 @@
 """Print how many grasp trials a second engine `warp` makes, and how often engine `c` comes to the same verdicts.
 
-python benchmarks/experiments/grasp_trials.py FOLDER_OF_ASSETS [--places 4] [--jobs N]
+python benchmarks/batch/grasp_trials.py FOLDER_OF_ASSETS [--places 4] [--jobs N]
 
 Every grasp of every asset is tried with four frictions and some places of the hand. Both engines try each grasp with
 the hand at its place. Times are those of a second run, without compiling.

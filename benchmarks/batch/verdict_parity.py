@@ -1,6 +1,6 @@
 """Print how often recorded plans end with the same verdict on two engines, each in the world that it was made in.
 
-python benchmarks/experiments/verdict_parity.py TASK ... [--plan-from DIR] [--plans N] [--engines c warp]
+python benchmarks/batch/verdict_parity.py TASK ... [--plan-from DIR] [--plans N] [--engines c warp]
 
 Without --plan-from, plans of the baseline with true poses are recorded first. A replay that diverged, or whose contacts
 had too little room, is a failure. `MANIPOSE_WARP_ON_CPU=1` runs `warp` without a GPU, slowly.

@@ -1,6 +1,6 @@
 """Print how fast batched worlds step beside MuJoCo Playground's `PandaPickCube` on MuJoCo Warp, in one process, in turns.
 
-python benchmarks/experiments/playground_comparison.py [--worlds 8192 32768] [--objects box_000]
+python benchmarks/batch/playground_comparison.py [--worlds 8192 32768] [--objects box_000]
 
 Needs an NVIDIA GPU and `pip install playground==0.2.0`. Both make ten physics steps of 2 ms in a control step, and random
 actions, each held for 25. Playground in its default configuration has room for the contacts of 2,048 worlds; its best is the

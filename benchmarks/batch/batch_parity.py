@@ -1,6 +1,6 @@
 """Print how far one control step of engine `warp` is from engine `c`'s, from the same states.
 
-python benchmarks/experiments/batch_parity.py TASK [--objects NAME ...] [--worlds N] [--pool FILE]
+python benchmarks/batch/batch_parity.py TASK [--objects NAME ...] [--worlds N] [--pool FILE]
 
 Hands go to the objects, close, and lift, on engine `c`; at several moments both engines make one step from where it is.
 States in which the robot touches nothing and the others are counted apart.

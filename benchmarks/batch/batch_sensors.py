@@ -1,6 +1,6 @@
 """Print how fast batched worlds see, and how long the way from images to joint angles takes.
 
-python benchmarks/experiments/batch_sensors.py [single_object/target_pose] --objects mug_000 --worlds 1024 [--engine warp|c]
+python benchmarks/batch/batch_sensors.py [single_object/target_pose] --objects mug_000 --worlds 1024 [--engine warp|c]
 
 Three cameras. "look": depth and segmentation. "with noise and clouds": a Kinect's noise, and a cloud of the object
 with normals. "whole loop": look, noise, cloud, pose estimate, grasp choice, inverse kinematics. Medians of the turns.

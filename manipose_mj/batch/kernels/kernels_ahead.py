@@ -151,6 +151,6 @@ def compile_share(folder: Path) -> None:
 
 if __name__ == "__main__":
     # Under its own name, so that what is pickled is found again.
-    from manipose_mj.batch import kernels_ahead
+    from manipose_mj.batch.kernels import kernels_ahead
 
     kernels_ahead.compile_share(Path(sys.argv[1]))

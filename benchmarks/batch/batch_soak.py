@@ -1,6 +1,6 @@
 """Step batched worlds for minutes with random actions, and print whether speed, memory or numbers change.
 
-python benchmarks/experiments/batch_soak.py TASK [--minutes 20] [--worlds 8192] [--engine warp] [--objects NAME ...]
+python benchmarks/batch/batch_soak.py TASK [--minutes 20] [--worlds 8192] [--engine warp] [--objects NAME ...]
 
 Each minute: environment steps a second, memory of the device and of this process, values that are not finite in worlds that
 are not flagged `physics`, worlds flagged so, worlds whose contacts had too little room, episodes that ended. The last line

@@ -1,6 +1,6 @@
 """Print how long each kernel of a scene takes to compile for a GPU that need not be there.
 
-python benchmarks/experiments/kernel_compile_times.py TASK [--objects NAME ...] [--arch 90] [--optimization 0-3] [--ptx]
+python benchmarks/batch/kernel_compile_times.py TASK [--objects NAME ...] [--arch 90] [--optimization 0-3] [--ptx]
     [--only TEXT]
 
 CPU seconds of one process, one module after the other, into an empty folder; the slowest first, then the sum.
@@ -17,7 +17,7 @@ import warp as wp  # pyright: ignore[reportMissingImports]
 
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.engine_warp import dry_engine
-from manipose_mj.batch.kernels_ahead import Launch, launches
+from manipose_mj.batch.kernels.kernels_ahead import Launch, launches
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.tasks.core.config import EnvConfig

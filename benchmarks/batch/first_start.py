@@ -1,6 +1,6 @@
 """Print how long the first step of batched worlds takes from nothing, and from a warm kernel cache, by stage.
 
-python benchmarks/experiments/first_start.py TASK [--objects NAME ...] [--worlds 8192] [--pool FILE] [--engine warp]
+python benchmarks/batch/first_start.py TASK [--objects NAME ...] [--worlds 8192] [--pool FILE] [--engine warp]
 
 Each start is a process of its own. The first has an empty cache of kernels, unless CUDA's own (`~/.nv`) knows some; the second
 has the first one's. `WARP_CACHE_PATH` is set for both.

@@ -1,0 +1,1 @@
+"""Kernels of the engine `warp`: our own, and all of them compiled ahead of the first step."""
