@@ -51,16 +51,13 @@ def part_swap_clouds(
       InputError: There are fewer than two categories whose ends can be told apart, a setting
         needs resting poses, or the cache cannot be written.
     """
-    donors = tuple(sorted(c for c in categories if part_swappable(catalogue.generate(c, 0).label)))
+    donors = _swappable(categories)
     if len(donors) < 2:
         raise InputError(
             f"objects are made of two of {', '.join(categories)}; expected at least two categories "
             "whose ends can be told apart"
         )
-    if setting.placement != "anywhere":
-        raise InputError(
-            f"setting {setting.name!r} needs resting poses, which objects made of two lack"
-        )
+    _require_no_table(setting)
     work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
         joblib.delayed(_fill)(donors, number, setting) for number in range(count)
     )
@@ -97,13 +94,10 @@ def asset_part_swap_clouds(
         resting poses.
     """
     assets = [whole for whole in wholes if part_swappable(whole.label)]
-    donors = tuple(sorted(c for c in categories if part_swappable(catalogue.generate(c, 0).label)))
+    donors = _swappable(categories)
     if not assets:
         raise InputError("objects are made of two; the assets' ends cannot be told apart")
-    if setting.placement != "anywhere":
-        raise InputError(
-            f"setting {setting.name!r} needs resting poses, which objects made of two lack"
-        )
+    _require_no_table(setting)
     work = joblib.Parallel(n_jobs=jobs, return_as="generator")(
         joblib.delayed(_asset_part_swap)(assets, donors, number, setting) for number in range(count)
     )
@@ -113,6 +107,17 @@ def asset_part_swap_clouds(
         if progress is not None:
             progress(done, count, f"{ASSET_CATEGORY}_{done:05d}")
     return clouds
+
+
+def _swappable(categories: Sequence[str]) -> tuple[str, ...]:
+    return tuple(sorted(c for c in categories if part_swappable(catalogue.generate(c, 0).label)))
+
+
+def _require_no_table(setting: ViewSetting) -> None:
+    if setting.placement != "anywhere":
+        raise InputError(
+            f"setting {setting.name!r} needs resting poses, which objects made of two lack"
+        )
 
 
 def _asset_part_swap(
