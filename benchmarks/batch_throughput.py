@@ -24,6 +24,7 @@ import numpy as np
 from mujoco import rollout
 
 from manipose_mj import batch
+from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.starts import StartPool
@@ -51,6 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--processes", type=int, default=1, help="of engine c")
     parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
     parser.add_argument("--impratio", type=float, help="instead of the model's own")
+    parser.add_argument(
+        "--room", nargs=2, type=int, metavar=("CONTACTS", "ROWS"), help="of a world, of engine warp"
+    )
     parser.add_argument("--resets", type=float, default=0.0, help="share of worlds reset a step")
 
 
@@ -89,7 +93,10 @@ def _pool(task: str, arguments: argparse.Namespace) -> StartPool:
 
 def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) -> None:
     started = time.perf_counter()
-    worlds = batch.from_pool(pool, count, arguments.engine, processes=arguments.processes)
+    room = None if arguments.room is None else Capacity(*arguments.room)
+    worlds = batch.from_pool(
+        pool, count, arguments.engine, processes=arguments.processes, capacity=room
+    )
     made = time.perf_counter() - started
     state = worlds.reset(jax.random.key(0))
     actions = _actions(state, arguments.steps)

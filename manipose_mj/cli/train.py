@@ -36,12 +36,12 @@ def train_ppo(
     pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     policy: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> int:
-    """Learn to open or shut a drawer or door, on the furniture for training, by proximal policy optimisation.
+    """Learn to open or shut a drawer or door, or to move one object, by proximal policy optimisation.
 
     Writes policy.npz, which evaluate plays, and curve.json.
 
     Args:
-      task: One of articulated/open_* and close_*.
+      task: One of articulated/open_* and close_*, or one about a single object, also of your own.
       out: Folder to write to; without it ppo/NAME.
       worlds: At the same time.
       starts: Episodes that the worlds begin with, drawn once.
@@ -51,7 +51,7 @@ def train_ppo(
       until: Stop once this share of the episodes succeed, with the noise of exploration.
       episode: Length of an episode in training.
       engine: warp, on a GPU; c, on the CPU, far slower; auto, the former where it runs.
-      objects: Furniture instead of the built-in pieces for training: names, asset folders, or folders of them.
+      objects: Instead of the built-in ones for training: names, asset folders, or folders of them.
       pool: File with the starts: read if it is there, otherwise written.
       policy: The policy.npz of a training, from which this one goes on.
     """

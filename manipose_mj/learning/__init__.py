@@ -4,7 +4,8 @@
 
 | module | holds |
 |---|---|
-| `handle_frame.py` | what a policy sees and does, in the frame of the handle |
+| `handle_frame.py`, `object_frame.py`, `frames.py` | what a policy sees and does, in the frame of a handle or object |
+| `grip.py` | moving a hand about such a frame |
 | `network.py` | actor and critic |
 | `ppo.py` | proximal policy optimisation: rollout and update in one `scan` |
 | `training.py` | a training from a task's name to a file |

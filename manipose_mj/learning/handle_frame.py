@@ -7,19 +7,17 @@ Pure functions of observations with any leading dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.actions.tcp_motion import euler_angles
+from manipose_mj.learning import grip
+from manipose_mj.learning.grip import Observation
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
-from manipose_mj.poses import Array, compose, invert, rotation_to_quaternion, vector_to_pose
+from manipose_mj.poses import Array, compose, invert
 
-CONTROL_MODE, OBS_MODE = "pd_ee_pose", "state+pose"
-ACTIONS = 7
-SEEN = (
+NEEDS: str = "a task that opens or shuts one drawer or door"
+SEEN: tuple[str, ...] = (
     "pose/robot/handle",
     "pose/robot/joint",
     "pose/opening",
@@ -28,32 +26,24 @@ SEEN = (
     "panda/joint_positions",
     "panda/joint_velocities",
 )
-# How far from the handle an action can ask the TCP to go, and how far from the grip's rotation [m, rad].
-_REACH, _TILT = 0.15, 0.6
-# How far from where it is the TCP is sent at once [m, rad].
-_STEP, _TURN = 0.12, 0.6
-
-Observation = Mapping[str, Array]
 
 
 def grip_frame(observation: Observation) -> Float[Array, "*b 4 4"]:
     """`T_base_grip`."""
-    handle, tcp = observation["pose/robot/handle"], _tcp(observation)
-    into, across = -handle[..., :3, 1], handle[..., :3, 2]
-    alike = jnp.sum(tcp[..., :3, 1] * across, axis=-1, keepdims=True)
-    across = jnp.where(alike < 0, -across, across)
+    handle = observation["pose/robot/handle"]
+    into = -handle[..., :3, 1]
+    across = grip.nearer_half_turn(handle[..., :3, 2], grip.tcp_pose(observation))
     columns = (jnp.linalg.cross(across, into), across, into)
     return compose(jnp.stack(columns, axis=-1), handle[..., :3, 3])
 
 
 def features(observation: Observation) -> Float[Array, "*b n"]:
     """What the networks see: hand, robot, joint of the furniture and the vertical, in the grip frame."""
-    grip = grip_frame(observation)
-    to_grip = invert(grip)
+    to_grip = invert(grip_frame(observation))
     joint = to_grip @ observation["pose/robot/joint"]
     seen = (
-        *_columns(to_grip @ _tcp(observation)),
-        *_columns(joint),
+        *grip.pose_features(to_grip @ grip.tcp_pose(observation)),
+        *grip.pose_features(joint),
         to_grip[..., :3, 3],  # the robot's base
         to_grip[..., :3, 2],  # the vertical
         observation["pose/opening"],
@@ -65,56 +55,5 @@ def features(observation: Observation) -> Float[Array, "*b n"]:
 
 
 def command(observation: Observation, action: Float[Array, "*b 7"]) -> Float[Array, "*b 7"]:
-    """An action of the control mode `pd_ee_pose`.
-
-    Args:
-      observation: Of the present.
-      action: Numbers from -1 to 1: where the TCP shall go, in the grip frame; how it shall be turned from it, as a
-        rotation vector; and the opening.
-    """
-    action = jnp.clip(action, -1.0, 1.0)
-    grip = grip_frame(observation)
-    now = invert(grip) @ _tcp(observation)
-    away = _REACH * action[..., :3] - now[..., :3, 3]
-    turn = rotation_vector(
-        rotation_matrix(_TILT * action[..., 3:6]) @ jnp.swapaxes(now[..., :3, :3], -1, -2)
-    )
-    position = now[..., :3, 3] + _at_most(away, _STEP)
-    rotation = rotation_matrix(_at_most(turn, _TURN)) @ now[..., :3, :3]
-    target = grip @ compose(rotation, position)
-    opening = MAX_OPENING * (action[..., 6:] + 1) / 2
-    return jnp.concatenate(
-        [target[..., :3, 3], euler_angles(target[..., :3, :3]), opening], axis=-1
-    )
-
-
-def rotation_matrix(vector: Float[Array, "*b 3"]) -> Float[Array, "*b 3 3"]:
-    """Of a rotation vector: axis times angle [rad] (Rodrigues)."""
-    angle = jnp.sqrt(jnp.sum(vector**2, axis=-1) + 1e-12)[..., None, None]
-    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
-    none = jnp.zeros_like(x)
-    rows = [none, -z, y, z, none, -x, -y, x, none]
-    skew = jnp.stack(rows, axis=-1).reshape(*x.shape, 3, 3) / angle
-    return jnp.eye(3) + jnp.sin(angle) * skew + (1 - jnp.cos(angle)) * skew @ skew
-
-
-def rotation_vector(rotation: Float[Array, "*b 3 3"]) -> Float[Array, "*b 3"]:
-    """Axis times angle [rad], at most half a turn."""
-    quaternion = rotation_to_quaternion(rotation)
-    quaternion = jnp.where(quaternion[..., :1] < 0, -quaternion, quaternion)
-    sine = jnp.sqrt(jnp.sum(quaternion[..., 1:] ** 2, axis=-1, keepdims=True) + 1e-12)
-    return quaternion[..., 1:] * (2 * jnp.arctan2(sine, quaternion[..., :1]) / sine)
-
-
-def _at_most(vector: Float[Array, "*b 3"], length: float) -> Float[Array, "*b 3"]:
-    own = jnp.sqrt(jnp.sum(vector**2, axis=-1, keepdims=True) + 1e-12)
-    return vector * jnp.minimum(1.0, length / own)
-
-
-def _tcp(observation: Observation) -> Float[Array, "*b 4 4"]:
-    return vector_to_pose(jnp.asarray(observation["panda/tcp_pose"]))
-
-
-def _columns(pose: Float[Array, "*b 4 4"]) -> tuple[Array, Array, Array]:
-    """Position, and two columns of the rotation."""
-    return pose[..., :3, 3], pose[..., :3, 0], pose[..., :3, 1]
+    """An action of the control mode `pd_ee_pose`, as of `grip.command`."""
+    return grip.command(grip_frame(observation), grip.tcp_pose(observation), action)

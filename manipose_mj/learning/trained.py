@@ -23,7 +23,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from manipose_mj.errors import InputError
-from manipose_mj.learning import handle_frame
+from manipose_mj.learning import grip
+from manipose_mj.learning.frames import FRAMES
 from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
 from manipose_mj.policies.protocol import ActionSpace
 from manipose_mj.storage.cache_file import new_cache_file
@@ -43,6 +44,7 @@ class Trained:
       hz: Actions a second of simulated time.
       task: Trained on, `"domain/name"`.
       seed: Of the training.
+      frame: In which it sees and acts, a name of `frames.FRAMES`.
     """
 
     network: ActorCritic
@@ -51,6 +53,7 @@ class Trained:
     hz: float
     task: str
     seed: int
+    frame: str = "handle"
 
     def save(self, path: Path) -> None:
         """Write the actor, in half precision, and what is needed to run it."""
@@ -60,6 +63,7 @@ class Trained:
             "hz": self.hz,
             "task": self.task,
             "seed": self.seed,
+            "frame": self.frame,
         }
         arrays: dict[str, Any] = {
             f"leaf_{i}": np.asarray(leaf, np.float16)
@@ -102,6 +106,7 @@ class Trained:
             header["hz"],
             header["task"],
             header["seed"],
+            header.get("frame", "handle"),
         )
 
 
@@ -120,6 +125,7 @@ class TrainedPolicy:
         own = Path(str(resources.files("manipose_mj.learning"))) / "weights" / f"{path}.npz"
         file = own if own.is_file() else Path(path)
         self._trained = trained = Trained.load(file)
+        self._frame = FRAMES[trained.frame]
         self.metadata = {
             "trained on": trained.task,
             "seed": trained.seed,
@@ -133,14 +139,14 @@ class TrainedPolicy:
         Raises:
           InputError: The observations lack something that it sees.
         """
-        missing = [name for name in handle_frame.SEEN if name not in observation]
+        frame = self._frame
+        missing = [name for name in frame.SEEN if name not in observation]
         if missing:
             raise InputError(
-                f"this policy sees {', '.join(missing)}; add --obs-mode {handle_frame.OBS_MODE}, and take a task "
-                "that opens or shuts one drawer or door"
+                f"this policy sees {', '.join(missing)}; add --obs-mode {grip.OBS_MODE}, and take {frame.NEEDS}"
             )
-        seen = self._trained.normaliser(handle_frame.features(observation))
-        return handle_frame.command(observation, self._trained.network.mean(seen))
+        seen = self._trained.normaliser(frame.features(observation))
+        return frame.command(observation, self._trained.network.mean(seen))
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
         """Check that actions mean what they meant in training.
@@ -148,7 +154,7 @@ class TrainedPolicy:
         Raises:
           InputError: They do not.
         """
-        mode, hz = handle_frame.CONTROL_MODE, self._trained.hz
+        mode, hz = grip.CONTROL_MODE, self._trained.hz
         if action_space.control_mode != mode or abs(action_space.hz - hz) > 1e-6:
             raise InputError(
                 f"this policy acts in {mode} at {hz:g} Hz; got {action_space.control_mode} at {action_space.hz:g} "
@@ -163,7 +169,7 @@ class TrainedPolicy:
         """
         seen = {
             name: jnp.asarray(obs[name], jnp.float32)[None]
-            for name in handle_frame.SEEN
+            for name in self._frame.SEEN
             if name in obs
         }
         return {"actions": np.asarray(self._act(seen), float)}

@@ -18,7 +18,8 @@ from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import EngineName, available_engine, from_pool
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
-from manipose_mj.learning import handle_frame
+from manipose_mj.learning import grip
+from manipose_mj.learning.frames import FRAMES, frame_of
 from manipose_mj.learning.network import NetworkConfig
 from manipose_mj.learning.ppo import Learner, Ppo, PpoConfig, Progress
 from manipose_mj.learning.trained import Trained
@@ -37,7 +38,7 @@ class TrainingConfig:
     """What is trained, and for how long.
 
     Attributes:
-      task: One that opens or shuts a drawer or door.
+      task: One that opens or shuts a drawer or door, or that is about one object.
       worlds: At the same time.
       starts: Episodes that the worlds begin with, of the seeds from `first_start` on.
       first_start: The first of these seeds.
@@ -78,8 +79,8 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
     else:
         env_config = EnvConfig(
             config.task,
-            obs_mode=handle_frame.OBS_MODE,
-            control_mode=handle_frame.CONTROL_MODE,
+            obs_mode=grip.OBS_MODE,
+            control_mode=grip.CONTROL_MODE,
             reward_mode="dense",
             objects=config.objects,
         )
@@ -88,16 +89,12 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
         if path is not None:
             pool.save(path)
     layout = pool.layout
-    modes = (handle_frame.OBS_MODE, handle_frame.CONTROL_MODE, "dense")
+    modes = (grip.OBS_MODE, grip.CONTROL_MODE, "dense")
     if (layout.obs_mode, layout.control_mode, layout.reward_mode) != modes or (
         layout.task != config.task
     ):
         raise InputError(f"{path}: its starts are of another task or mode; draw them again")
-    if "handle" not in layout.frames or layout.objects:
-        raise InputError(
-            f"{config.task}: what is trained opens or shuts one drawer or door; choose one of the tasks "
-            "articulated/open_* and close_*"
-        )
+    frame_of(config.task, layout.frames)
     # Episodes are shorter than the task's.
     steps = round(config.episode / (layout.timestep * layout.substeps))
     return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
@@ -126,7 +123,8 @@ def train(
         raise InputError(f"{config.worlds} worlds are too few for {ppo.minibatches} minibatches")
     started = time.monotonic()
     worlds = from_pool(pool, config.worlds, available_engine(config.engine))
-    learning = Ppo(worlds, handle_frame.features, handle_frame.command, handle_frame.ACTIONS, ppo)
+    frame = FRAMES[frame_of(config.task, pool.layout.frames)]
+    learning = Ppo(worlds, frame.features, frame.command, grip.ACTIONS, ppo)
     learner = learning.begin(jax.random.key(config.seed))
     if before is not None:
         learner = _going_on(learner, before)
@@ -170,7 +168,10 @@ def _trained(config: TrainingConfig, pool: StartPool, learner: Learner) -> Train
     sizes = NetworkConfig(network.actor.in_size, network.actor.out_size)  # pyright: ignore[reportArgumentType]
     layout = pool.layout
     hz = 1 / (config.ppo.hold * layout.substeps * layout.timestep)
-    return Trained(network, learner.normaliser, sizes, round(hz, 6), config.task, config.seed)
+    frame = frame_of(config.task, layout.frames)
+    return Trained(
+        network, learner.normaliser, sizes, round(hz, 6), config.task, config.seed, frame
+    )
 
 
 def _row(progress: Progress) -> Row:

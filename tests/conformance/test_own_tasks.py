@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import sys
 
 import gymnasium
 import numpy as np
@@ -12,8 +13,10 @@ from dm_control import suite as dm_suite
 
 import manipose_mj
 from manipose_mj import suite
+from manipose_mj.errors import InputError
 from manipose_mj.gym import env_id
 from manipose_mj.tasks.core.registry import task_spec
+from manipose_mj.tasks.own_modules import import_own_tasks
 from tests.conformance.own_tasks import diverging, forget, registered
 from tests.places import ROOT
 
@@ -78,3 +81,20 @@ def test_a_name_is_taken_once(lift_mug):
     ):
         pass
     assert ("example", "target_pose") not in suite.ALL_TASKS
+
+
+def test_modules_that_the_environment_names_are_imported(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "lift_mug_module.py").write_text(code, encoding="utf-8")
+    monkeypatch.setenv("MANIPOSE_TASKS", "lift_mug_module, ")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    import_own_tasks()
+    try:
+        import_own_tasks()  # a second time changes nothing
+        assert ("example", "lift_mug") in suite.ALL_TASKS
+    finally:
+        forget("example", "lift_mug")
+    monkeypatch.setenv("MANIPOSE_TASKS", "no_such_module")
+    with pytest.raises(InputError, match="MANIPOSE_TASKS=no_such_module: cannot import"):
+        import_own_tasks()

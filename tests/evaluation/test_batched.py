@@ -16,7 +16,7 @@ from manipose_mj.evaluation.batched import batched_results
 from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
-from manipose_mj.learning import handle_frame
+from manipose_mj.learning import grip, handle_frame
 from manipose_mj.poses import invert, vector_to_pose
 
 TASK = "articulated/open_middle_drawer"
@@ -29,9 +29,9 @@ class Puller:
     def reset(self, **episode) -> None: ...
 
     def act(self, observation: Mapping[str, Array]) -> Array:
-        grip = handle_frame.grip_frame(observation)
-        now = invert(grip) @ vector_to_pose(jnp.asarray(observation["panda/tcp_pose"]))
-        place, turn = now[:, :3, 3], handle_frame.rotation_vector(now[:, :3, :3])
+        frame = handle_frame.grip_frame(observation)
+        now = invert(frame) @ vector_to_pose(jnp.asarray(observation["panda/tcp_pose"]))
+        place, turn = now[:, :3, 3], grip.rotation_vector(now[:, :3, :3])
         aside = jnp.linalg.norm(place[:, :2], axis=-1)
         before = (aside < _NEAR) & (jnp.linalg.norm(turn, axis=-1) < 0.2)
         there = before & (jnp.abs(place[:, 2]) < _NEAR)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.actions.tcp_motion import euler_rotation
-from manipose_mj.learning import handle_frame
+from manipose_mj.learning import grip, handle_frame
 from manipose_mj.poses import compose, pose_to_vector, rotation_about
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -51,17 +51,17 @@ def test_features_stay_and_targets_turn_with_the_scene(yaw):
 
 
 def test_no_action_at_the_grip_keeps_the_hand_there():
-    grip = np.asarray(handle_frame.grip_frame(scene()))[0]
-    np.testing.assert_allclose(grip[:3, 2], [1, 0, 0], atol=1e-6)  # into the drawer
-    held = scene(hand=grip)
-    np.testing.assert_allclose(target(held, np.zeros(7, np.float32)), grip, atol=1e-5)
+    frame = np.asarray(handle_frame.grip_frame(scene()))[0]
+    np.testing.assert_allclose(frame[:3, 2], [1, 0, 0], atol=1e-6)  # into the drawer
+    held = scene(hand=frame)
+    np.testing.assert_allclose(target(held, np.zeros(7, np.float32)), frame, atol=1e-5)
     pulled = target(held, np.array([0, 0, -0.5, 0, 0, 0, 0], np.float32))
-    np.testing.assert_allclose(pulled[:3, 3] - grip[:3, 3], [-0.075, 0, 0], atol=1e-5)
+    np.testing.assert_allclose(pulled[:3, 3] - frame[:3, 3], [-0.075, 0, 0], atol=1e-5)
 
 
 def test_the_hand_takes_the_nearer_half_turn():
-    grip = np.asarray(handle_frame.grip_frame(scene()))[0]
-    half = grip @ compose(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
+    frame = np.asarray(handle_frame.grip_frame(scene()))[0]
+    half = frame @ compose(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
     np.testing.assert_allclose(
         np.asarray(handle_frame.grip_frame(scene(hand=half)))[0], half, atol=1e-6
     )
@@ -69,7 +69,7 @@ def test_the_hand_takes_the_nearer_half_turn():
 
 def test_targets_are_near_the_hand_and_actions_have_limits():
     observation = scene()
-    hand = np.asarray(handle_frame._tcp(observation))[0]
+    hand = np.asarray(grip.tcp_pose(observation))[0]
     far = target(observation, np.full(7, 50.0, np.float32))
     assert np.linalg.norm(far[:3, 3] - hand[:3, 3]) <= 0.12 + 1e-5
     np.testing.assert_allclose(far, target(observation, np.ones(7, np.float32)), atol=1e-6)
@@ -79,5 +79,5 @@ def test_targets_are_near_the_hand_and_actions_have_limits():
 
 def test_rotation_vectors_are_the_inverse_of_their_matrix():
     vectors = np.random.default_rng(0).normal(0, 0.8, (50, 3)).astype(np.float32)
-    found = handle_frame.rotation_vector(handle_frame.rotation_matrix(jnp.asarray(vectors)))
+    found = grip.rotation_vector(grip.rotation_matrix(jnp.asarray(vectors)))
     np.testing.assert_allclose(found, vectors, atol=2e-5)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.errors import InputError
-from manipose_mj.learning import TrainedPolicy, handle_frame
+from manipose_mj.learning import TrainedPolicy, grip, handle_frame
 from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
 from manipose_mj.learning.trained import Trained
 from manipose_mj.policies import ActionSpace, Policy
@@ -20,7 +20,7 @@ from tests.learning.test_handle_frame import scene
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     features = handle_frame.features(scene()).shape[-1]
-    config = NetworkConfig(features, handle_frame.ACTIONS)
+    config = NetworkConfig(features, grip.ACTIONS)
     network = ActorCritic(config, key=jax.random.key(1))
     wide = jax.tree.map(lambda leaf: 3 * leaf if isinstance(leaf, jax.Array) else leaf, network)
     normaliser = Normaliser.fresh(features).updated(jnp.ones((5, features)))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import equinox as eqx
 import jax
@@ -10,8 +12,10 @@ import pytest
 
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
+from manipose_mj.learning.frames import frame_of
 from manipose_mj.learning.trained import Trained
 from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, training_pool
+from tests.places import ROOT
 
 TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
 
@@ -27,10 +31,12 @@ def test_starts_are_kept_in_a_file_with_shorter_episodes(tmp_path):
         training_pool(other, tmp_path / "starts")
 
 
-def test_tasks_without_a_handle_are_refused():
-    config = TrainingConfig("single_object/target_pose", starts=1, objects=("box_000",))
-    with pytest.raises(InputError, match="opens or shuts one drawer or door"):
-        training_pool(config)
+def test_tasks_with_an_object_and_a_handle_are_refused():
+    posed = {"object", "handle", "joint"}
+    with pytest.raises(InputError, match="opens or shuts one drawer or door or a task about one"):
+        frame_of("articulated/store_middle_drawer", posed)
+    assert frame_of("articulated/open_oven", {"handle", "joint"}) == "handle"
+    assert frame_of("single_object/target_pose_shelf", {"object", "shelf"}) == "object"
 
 
 def test_bad_numbers_end_in_one_line(capsys):
@@ -77,3 +83,26 @@ def test_a_training_leaves_a_policy_that_evaluate_plays(tmp_path, capsys):
     assert main([*words, "--engine", "c", "--worlds", "2"]) == 0
     lines = (results / "results.jsonl").read_text().splitlines()
     assert [json.loads(line)["steps"] for line in lines] == [2000, 2000]
+
+
+@pytest.mark.full
+def test_a_task_of_ones_own_about_an_object_is_learnt_and_played(tmp_path, monkeypatch):
+    """Each command in a process of its own, as the variable is read when the tasks are registered."""
+    monkeypatch.setenv("MANIPOSE_TASKS", "lift_task")
+    out, objects = tmp_path / "lift", ("--objects", "box_000")
+    command = (sys.executable, "-m", "manipose_mj.cli.main")
+    learn = ("train", "ppo", "example/lift", "--worlds", "4", "--starts", "2", "--updates", "1")
+    play = ("evaluate", "example/lift", "--episodes", "1", "--obs-mode", "state+pose", "--hz", "5")
+    policy = ("--policy", "manipose_mj.learning:TrainedPolicy", "--control-mode", "pd_ee_pose")
+    path = ("--policy-args", json.dumps({"path": str(out / POLICY_FILE)}))
+    for words in (
+        (*learn, "--engine", "c", *objects, "--out", str(out)),
+        (*play, *policy, *path, *objects, "--out", str(tmp_path / "results")),
+    ):
+        done = subprocess.run(
+            [*command, *words], cwd=ROOT / "benchmarks" / "batch", capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+    assert Trained.load(out / POLICY_FILE).frame == "object"
+    (line,) = (tmp_path / "results" / "results.jsonl").read_text().splitlines()
+    assert json.loads(line)["steps"] == pytest.approx(1000, abs=1)
