@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipose_mj.assets.asset import Asset
+from manipose_mj.errors import InputError
 from manipose_mj.poses import Array, namespace
 from manipose_mj.tasks import (
     EnvConfig,
@@ -31,6 +32,7 @@ from manipose_mj.tasks.goals.stages import reach
 from manipose_mj.tasks.scene.resting import pose_on_table, require_graspable
 
 HEIGHT = 0.15  # above where it lay [m]
+FROM_ABOVE, FEWEST = 0.8, 5  # cosine of a grasp's angle to the vertical; such grasps
 X_RANGE, Y_RANGE = (0.38, 0.60), (-0.28, 0.28)
 
 
@@ -61,20 +63,19 @@ class LiftedGoal(Goal):
 
 
 class Lift(ManipulationTask):
-    """One object in any stable pose in which a gripper from above has grasps; turned freely about the vertical."""
+    """One object in any stable pose in which it can be taken from above, turned freely about the vertical."""
 
     def __init__(self, assets: tuple[Asset, ...], env_config: EnvConfig) -> None:
         super().__init__(TaskConfig(horizon=20.0), env_config)
         self.assets = assets
+        self._held = [poses_held_from_above(asset) for asset in assets]
         self.pool = self.scene.add_objects(assets)
 
     def sample(
         self, rng: np.random.RandomState, spec: EpisodeSpec, preview: Preview
     ) -> EpisodeStart:
         index = self.pool.choose(rng, spec.object)
-        asset = self.assets[index]
-        assert asset.grasps is not None
-        held = [i for i in range(len(asset.stable_poses)) if asset.grasps.clear[:, i].any()]
+        asset, held = self.assets[index], self._held[index]
         place = rng.uniform([X_RANGE[0], Y_RANGE[0]], [X_RANGE[1], Y_RANGE[1]])
         pose = pose_on_table(asset, held[rng.randint(len(held))], place, rng.uniform(-np.pi, np.pi))
         rest = np.asarray((pose @ asset.label.pose)[2, 3])
@@ -83,8 +84,26 @@ class Lift(ManipulationTask):
         )
 
 
+def poses_held_from_above(asset: Asset) -> list[int]:
+    """The stable poses with enough grasps that come from above.
+
+    Raises:
+      InputError: There is none.
+    """
+    require_graspable(asset)
+    assert asset.grasps is not None
+    down = np.stack(
+        [-asset.grasps.poses[:, :3, 2] @ rest.rotation[2] for rest in asset.stable_poses]
+    )
+    count = (asset.grasps.clear.T & (down > FROM_ABOVE)).sum(axis=1)
+    held = np.flatnonzero(count >= FEWEST)
+    if not len(held):
+        raise InputError(f"{asset.folder}: has no stable pose with {FEWEST} grasps from above")
+    return held.tolist()
+
+
 @register_task(
-    "example", "lift", tags=("rigid",), draws=one_object(require_graspable, rigid_rows())
+    "example", "lift", tags=("rigid",), draws=one_object(poses_held_from_above, rigid_rows())
 )
 def lift(env_config: EnvConfig, objects: SceneObjects) -> Lift:
     """Pick one object up and hold it 15 cm above where it lay."""

@@ -72,7 +72,8 @@ class WarpEngine:
         compiling = None
         if self._device.is_cuda and not dry:
             # One kernel depends on the room: it is compiled below.
-            compiling = begin_compiling(dry_engine, (pool, visual), self._device.arch)
+            likeness = f"{_likeness(model)} {visual}"
+            compiling = begin_compiling(dry_engine, (pool, visual), self._device.arch, likeness)
         self.capacity = capacity or probe(pool).capacity(worlds)
         with wp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)
@@ -327,6 +328,20 @@ class WarpEngine:
 def dry_engine(pool: StartPool, visual: bool) -> WarpEngine:
     """One world, for `kernels_ahead`: its kernels are those of many."""
     return WarpEngine(pool, 1, Capacity(_DRY_CONTACTS, _DRY_CONSTRAINTS), visual=visual, dry=True)
+
+
+def _likeness(model: mujoco.MjModel) -> str:
+    """The same for models that are expected to launch the same kernels."""
+    opt = model.opt
+    return str(
+        (
+            *(model.nq, model.nv, model.nu, model.na, model.nmocap, model.neq, model.ntendon),
+            *(opt.cone, opt.solver, opt.integrator, opt.jacobian, opt.noslip_iterations),
+            *(opt.enableflags, opt.disableflags),
+            sorted(set(zip(model.geom_type.tolist(), model.geom_condim.tolist(), strict=True))),
+            sorted(set(model.jnt_type.tolist())),
+        )
+    )
 
 
 def _size(data: Any) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -29,7 +30,7 @@ class Observer:
         self._constants = stack_trees([start.constants for start in pool.starts])
         self._parts = parse_modes(layout.obs_mode)
         first = stack_trees([pool.starts[0].measurement])
-        known = self._all(first, jnp.zeros(1, jnp.int32))
+        known = jax.eval_shape(self._all, first, jnp.zeros(1, jnp.int32))
         for part in self._parts:
             if "/" in part and part not in known:
                 raise unknown_name("observation key", part, known)

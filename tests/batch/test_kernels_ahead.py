@@ -30,7 +30,7 @@ def test_a_dry_run_finds_every_kernel_and_computes_nothing():
 
 
 def test_other_processes_compile_what_the_cache_lacks(cache, caplog):
-    begin = small_kernels.launch_all, (3,), 90
+    begin = small_kernels.launch_all, (3,), 90, "alike"
     compiling = kernels_ahead.begin_compiling(*begin)
     assert compiling is not None
     with caplog.at_level(logging.INFO):

@@ -4,6 +4,7 @@ What would be launched is found by a dry run, which launches nothing and needs n
 run on Warp's CPU device, and compiles those kernels into Warp's own cache that no other has begun with.
 """
 
+import json
 import logging
 import os
 import pickle
@@ -12,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -19,8 +21,12 @@ from unittest import mock
 
 import warp as wp  # pyright: ignore[reportMissingImports]
 
+from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.storage.source_hash import source_hash
+
 _log = logging.getLogger(__name__)
 _FEWEST = 4  # kernels that are worth other processes, which take some seconds to start
+_ENGINE = "manipose_mj.batch.engine_warp"
 _SLOW = "ccd_kernel"  # of convex shapes: each takes as long as all others together
 
 
@@ -66,7 +72,9 @@ class Compiling:
             _log.warning("%d of %d processes that compile kernels failed", failed, count)
 
 
-def begin_compiling(make: Callable[..., object], arguments: Any, arch: int) -> Compiling | None:
+def begin_compiling(
+    make: Callable[..., object], arguments: Any, arch: int, likeness: str
+) -> Compiling | None:
     """Start to compile what is not in Warp's cache yet.
 
     Args:
@@ -74,6 +82,8 @@ def begin_compiling(make: Callable[..., object], arguments: Any, arch: int) -> C
         nothing is computed.
       arguments: A tuple that can be pickled.
       arch: Of the GPU, as 90.
+      likeness: The same for arguments of which the same is expected to be launched: if all that was is compiled, no dry
+        run is made. What it misses is compiled where it is used.
 
     Returns:
       What to wait for; None where there is too little to do, or one core.
@@ -81,7 +91,14 @@ def begin_compiling(make: Callable[..., object], arguments: Any, arch: int) -> C
     cores = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
-    missing = [one for one in launches(make, arguments) if not _compiled(one, arch)]
+    note = _note(likeness, arch)
+    if _all_compiled(note, arch):
+        return None
+    found = launches(make, arguments)
+    missing = [one for one in found if not _compiled(one.name, arch)]
+    note.parent.mkdir(parents=True, exist_ok=True)
+    with new_cache_file(note) as scratch:
+        scratch.write_text(json.dumps([one.name for one in found]), encoding="utf-8")
     if cores < 2 or len(missing) < _FEWEST:
         return None
     _log.info("%d of the kernels' modules are compiled", len(missing))
@@ -124,8 +141,26 @@ def _recorded() -> Iterator[list[Launch]]:
         yield found
 
 
-def _compiled(launch: Launch, arch: int) -> bool:
-    folder = Path(wp.config.kernel_cache_dir) / launch.name
+def _note(likeness: str, arch: int) -> Path:
+    """Where the names of what is launched are kept, beside the kernels."""
+    words = (likeness, str(arch), *map(version, ("warp-lang", "mujoco-warp")))
+    return (
+        Path(wp.config.kernel_cache_dir)
+        / f"launches_{source_hash((__name__, _ENGINE), *words)}.json"
+    )
+
+
+def _all_compiled(note: Path, arch: int) -> bool:
+    """Whether everything in a note is."""
+    try:
+        names = json.loads(note.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return all(_compiled(name, arch) for name in names)
+
+
+def _compiled(name: str, arch: int) -> bool:
+    folder = Path(wp.config.kernel_cache_dir) / name
     return any(folder.glob(f"*.sm{arch}*"))
 
 
@@ -139,7 +174,7 @@ def compile_share(folder: Path) -> None:
     task = pickle.loads((folder / "task").read_bytes())
     make, arguments, arch, wp.config.kernel_cache_dir = task
     for launch in launches(make, arguments):
-        if _compiled(launch, arch):
+        if _compiled(launch.name, arch):
             continue
         try:
             (folder / launch.name).touch(exist_ok=False)

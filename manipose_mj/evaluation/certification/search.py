@@ -14,6 +14,7 @@ from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.evaluation.protocol.own_assets import pool_folders
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.start import NoStartError
 
 # Budgets of plans, each with a seed of its own: first what an evaluation has, at last three times as many.
 BUDGETS = (MAX_PLANS, MAX_PLANS, 3 * MAX_PLANS)
@@ -86,13 +87,16 @@ def _outcome(
     config = EnvConfig(task, obs_mode="state", split="test", objects=objects)
     reason = ""
     for attempt in attempts(frozen.seed) if certificate is None else (certificate,):
-        result, _ = run_episode(
-            config,
-            EpisodeSpec(**frozen.asked),
-            episode=number,
-            planner_seed=attempt.planner_seed,
-            plans=attempt.plans,
-        )
+        try:
+            result, _ = run_episode(
+                config,
+                EpisodeSpec(**frozen.asked),
+                episode=number,
+                planner_seed=attempt.planner_seed,
+                plans=attempt.plans,
+            )
+        except NoStartError as error:
+            return start, f"start: {error}"
         if result.success_at_end:
             return start, attempt
         reason = f"{result.failure}: {result.reason}"
