@@ -15,10 +15,13 @@ from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.robot import MAX_OPENING
+from manipose_mj.tasks.scene.overhang import from_below
 
 # How far to open beyond what was held, best first; how far neighbours may be pushed on the way back [m].
 _LETTING_GO = (OPENING_MARGIN, 0.006, 0.003)
 _UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estimated
+# The same of what lies over the table's edge: it sinks between the fingers.
+_FROM_BELOW_LETTING_GO = (MAX_OPENING, 0.055, 0.04, 0.025)
 _GIVING_WAY = (0.006, 0.012)
 
 
@@ -31,6 +34,8 @@ def opening_to_let_go(planner: MotionPlanner, estimate: SceneEstimate, name: str
         # What is not known well may hang on the fingers; they may be in its estimate, but not come deeper in.
         margins = (*_UNSURE_LETTING_GO, *_LETTING_GO)
         query = planner.excusing(estimate.joints, query)
+    if name in estimate.objects and from_below(planner.tcp_pose(estimate.joints)):
+        margins = (*_FROM_BELOW_LETTING_GO, *margins)
     for margin in margins:
         opening = min(estimate.opening + margin, MAX_OPENING)
         if not planner.collides(estimate.joints, replace(query, opening=opening)):

@@ -23,7 +23,14 @@ from manipose_mj.control.scene.cavity_mouth import outwards
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, rotation_about
-from manipose_mj.tasks.articulated.hand_room import Placement, count_clear, hands_around
+from manipose_mj.tasks.articulated.cavity_placement import MIN_GRASPS
+from manipose_mj.tasks.articulated.hand_room import (
+    STRAIGHT,
+    TILTED,
+    Placement,
+    count_clear,
+    hands_around,
+)
 from manipose_mj.tasks.articulated.part_shape import WIDE_OPEN
 from manipose_mj.tasks.goals import Goal, InsideGoal, OpenGoal, ShutGoal, TakenOutGoal
 
@@ -280,7 +287,9 @@ def poses_in_cavity(
     if cavity.moves_with_part and part.joint.kind == "slide":
         drawn = front[:2] * max(opening - part.joint.range[0], _AT_LEAST_DRAWN)
     found = []
-    for rotation in _ways_to_turn(obj):
+    rotations = _ways_to_turn(obj)
+    towards = _hand_towards(obj, rotations, open_side)
+    for rotation in rotations:
         reach = obj.label.reach(rotation)
         slack = (cavity.extents - CAVITY_MARGIN) / 2 - reach
         if (slack < 0).any():
@@ -288,7 +297,7 @@ def poses_in_cavity(
         height = resting_height(obj, rotation) if obj.rests else reach[2]
         floor = np.array([0.0, 0.0, height + DROP_HEIGHT - cavity.extents[2] / 2])
         other_side = float(rotation[2] @ down) < _SAME_SIDE
-        hands = _hands(obj, rotation, open_side)
+        hands = _hands(obj, rotation, open_side, towards)
         # From the middle of its box to the label's origin, and on to the object's.
         to_label = -(rotation @ obj.label.center) * [1, 1, 0]
         to_object = to_label - rotation @ obj.label.rotation.T @ obj.label.origin
@@ -311,14 +320,28 @@ def poses_in_cavity(
     return tuple(entry[5] for entry in found)
 
 
+def _hand_towards(
+    obj: ObjectEstimate,
+    rotations: list[Float[np.ndarray, "3 3"]],
+    open_side: Float[np.ndarray, "3"],
+) -> float:
+    """`STRAIGHT`; `TILTED` where too few grasps lead straight through an open side in front."""
+    from_above = open_side[2] > _SAME_SIDE
+    straight = (len(_hands(obj, turned, open_side, STRAIGHT)) for turned in rotations)
+    return STRAIGHT if from_above or any(count >= MIN_GRASPS for count in straight) else TILTED
+
+
 def _hands(
-    obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"], open_side: Float[np.ndarray, "3"]
+    obj: ObjectEstimate,
+    rotation: Float[np.ndarray, "3 3"],
+    open_side: Float[np.ndarray, "3"],
+    towards: float,
 ) -> Float[np.ndarray, "k b 8 3"]:
     """The hand at the grasps that are left when the object's label is turned so in a cavity."""
     rest = rest_of(obj, rotation)
     if rest is None:
         return np.zeros((0, 3, 8, 3))
-    return hands_around(obj.grasps, rest, rotation @ obj.label.rotation.T, open_side)
+    return hands_around(obj.grasps, rest, rotation @ obj.label.rotation.T, open_side, towards)
 
 
 def _boxes_inside(

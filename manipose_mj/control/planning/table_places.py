@@ -11,6 +11,8 @@ from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate
 from manipose_mj.mjcf.panda.robot import HOME
 from manipose_mj.poses import compose, rotation_about
+from manipose_mj.tasks.scene.overhang import lifts_with_room, poses_over_edge
+from manipose_mj.tasks.scene.resting import placements_joining
 
 UP = np.array([0.0, 0.0, 1.0])
 # An object is let go this high above the table [m].
@@ -63,6 +65,23 @@ def poses_with_rotation(
     own = obj.label_pose[:2, 3]
     order = sorted(PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
     return tuple(compose(rotation, np.array([x, y, height])) for x, y in order)
+
+
+def poses_at_edge(
+    obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]
+) -> tuple[tuple[Float[np.ndarray, "4 4"], ...], ...]:
+    """`T_world_label` over the table's edge, from where the object sinks until it is turned as `rotation`.
+
+    In groups, those first from where it sinks least.
+    None where grasps that are clear of the table lead there, or where it is not known which side is down.
+    """
+    now, then = rest_of(obj, obj.label_pose[:3, :3]), rest_of(obj, rotation)
+    if now is None or then is None or placements_joining(obj.grasps.clear, 1)[now, then] >= 0:
+        return ()
+    poses = poses_over_edge(obj.label, rotation)
+    poses[..., 2, 3] += DROP_HEIGHT
+    lifts = lifts_with_room(obj.label, rotation, obj.grasps, now)
+    return tuple(tuple(poses[lift]) for lift in lifts)
 
 
 def settled(obj: ObjectEstimate, label_pose: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:

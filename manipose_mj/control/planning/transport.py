@@ -7,7 +7,12 @@ from collections.abc import Iterator
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Plan, Step
 from manipose_mj.control.planning.regrasp import Poses, routes
-from manipose_mj.control.planning.table_places import poses_with_rotation, settled, upright_poses
+from manipose_mj.control.planning.table_places import (
+    poses_at_edge,
+    poses_with_rotation,
+    settled,
+    upright_poses,
+)
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.tasks.goals import OrientationGoal, PoseGoal, UprightGoal
 
@@ -31,6 +36,9 @@ def transport_plans(
         return
     for stops in routes(planner, estimate, obj, poses):
         yield place_at_each(goal.object, stops)
+    if isinstance(goal, OrientationGoal):
+        for at_edge in poses_at_edge(obj, goal.rotation):
+            yield place(goal.object, at_edge)
 
 
 def place_at_each(name: str, stops: tuple[Poses, ...]) -> Plan:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset, Cavity, MovingPart
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
-from manipose_mj.tasks.articulated.hand_room import MAX_WIDTH, Placement
+from manipose_mj.tasks.articulated.hand_room import MAX_WIDTH, STRAIGHT, TILTED, Placement
 from manipose_mj.tasks.articulated.part_room import cavity_of, outwards_of, room_at
 from manipose_mj.tasks.scene.object_pool import ObjectPool
 from manipose_mj.tasks.scene.resting import placements_between
@@ -192,11 +192,7 @@ def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...
     Raises:
       InputError: There is none.
     """
-    ways = tuple(
-        (stable, yaw)
-        for stable, yaw in ways_into(asset, part)
-        if _roomiest(asset, part, stable, resting(asset, stable, yaw))[0] >= MIN_GRASPS
-    )
+    _, ways = _held_ways(asset, part)
     if not ways:
         raise InputError(
             f"part {part.name!r}: a gripper that opens 80 mm can take none of {asset.name} out of it; "
@@ -205,11 +201,35 @@ def ways_in_hand(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...
     return ways
 
 
+def hand_towards(asset: Asset, part: MovingPart) -> float:
+    """How the hand comes to the asset behind a part: `STRAIGHT`, or `TILTED` where it has no room so.
+
+    Raises:
+      InputError: The asset does not fit the cavity.
+    """
+    return _held_ways(asset, part)[0]
+
+
+def _held_ways(asset: Asset, part: MovingPart) -> tuple[float, tuple[tuple[int, float], ...]]:
+    """How the hand comes to the asset, and the ways to lie in which it has room so."""
+    ways = ways_into(asset, part)
+    for towards in (STRAIGHT,) if cavity_of(part).moves_with_part else (STRAIGHT, TILTED):
+        held = tuple(
+            (stable, yaw)
+            for stable, yaw in ways
+            if _roomiest(asset, part, stable, resting(asset, stable, yaw), towards)[0] >= MIN_GRASPS
+        )
+        if held:
+            return towards, held
+    return STRAIGHT, ()
+
+
 def _roomiest(
     asset: Asset,
     part: MovingPart,
     stable: int,
     lying: Resting,
+    towards: float,
     cavity_world: Float[np.ndarray, "4 4"] | None = None,
 ) -> tuple[int, Float[np.ndarray, "2"]]:
     """Of a few places between a cavity's two sides, how many grasps have room at the best, and where that is."""
@@ -220,7 +240,8 @@ def _roomiest(
     best, where = -1, np.zeros(2)
     for share in shares:
         place = share * slack * outwards_of(part)
-        count = room_at(asset, part, stable, lying.pose(cavity, place), cavity_world=cavity_world)
+        pose = lying.pose(cavity, place)
+        count = room_at(asset, part, stable, pose, cavity_world=cavity_world, towards=towards)
         if count > best:
             best, where = count, place
         if best >= MIN_GRASPS:
@@ -253,7 +274,11 @@ class OwnPlace:
 
 
 class CavityPlacement:
-    """Where the objects of a pool lie in the cavity behind a part; the first is what the episode is about."""
+    """Where the objects of a pool lie in the cavity behind a part; the first is what the episode is about.
+
+    Attributes:
+      towards: How the hand comes to the first, as of `hand_towards`.
+    """
 
     def __init__(self, pool: ObjectPool, part: MovingPart, *, taken: bool) -> None:
         """Looks up every way to lie.
@@ -269,6 +294,7 @@ class CavityPlacement:
         self._assets = tuple(entity.asset for entity in pool.entities)
         self._part = part
         self._ways = [ways_into(asset, part) for asset in self._assets]
+        self.towards = hand_towards(self._assets[0], part)
         self._own = (ways_in_hand if taken else ways_stored)(self._assets[0], part)
 
     def inside(
@@ -307,12 +333,14 @@ class CavityPlacement:
             )
             assert tried is not None  # it fits, and nothing is in its way
             pose = lying.pose(cavity_of(part), tried.place)
-            count = room_at(asset, part, stable, pose, cavity_world=cavity_world)
+            count = room_at(
+                asset, part, stable, pose, cavity_world=cavity_world, towards=self.towards
+            )
             if count > best:
                 best, place = count, tried.place
             if best >= MIN_GRASPS:
                 return OwnPlace(stable, lying, place, room, best)
-        count, roomiest = _roomiest(asset, part, stable, lying, cavity_world)
+        count, roomiest = _roomiest(asset, part, stable, lying, self.towards, cavity_world)
         if count > best:
             best, place = count, roomiest
         return OwnPlace(stable, lying, place, room, best)
@@ -350,4 +378,4 @@ class CavityPlacement:
 
     def _room_beside(self, own: OwnPlace, others: Sequence[Placement]) -> int:
         asset, pose = self._assets[0], own.lying.pose(cavity_of(self._part), own.place)
-        return room_at(asset, self._part, own.stable, pose, others)
+        return room_at(asset, self._part, own.stable, pose, others, towards=self.towards)

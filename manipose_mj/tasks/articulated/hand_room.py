@@ -12,8 +12,8 @@ from manipose_mj.assets.asset import Cavity, GraspSet
 from manipose_mj.assets.franka_hand import FINGER_OFFSET, HAND_BOXES, TCP_OFFSET
 from manipose_mj.mjcf.panda.reachability import is_reachable
 
-# A cosine: grasps must come through the open side, or nearly.
-_TOWARDS = 0.85
+# Cosines to the way through the open side: grasps must come so, or nearly; what is held from above only is tilted.
+STRAIGHT, TILTED = 0.85, 0.5
 MAX_WIDTH = 0.0765  # between the pads [m]; they open 80 mm
 _OPENING = 0.006  # of each finger beside what it takes [m]
 # Of a finger, in the TCP's frame: half its width, its thickness, from where to where along the approach [m].
@@ -47,6 +47,7 @@ def free_grasps(
     others: Sequence[Placement] = (),
     drawn: Float[np.ndarray, "2"] | None = None,
     cavity_world: Float[np.ndarray, "4 4"] | None = None,
+    towards: float = STRAIGHT,
 ) -> int:
     """How many grasps of an object have room for hand and fingers where it lies.
 
@@ -59,10 +60,11 @@ def free_grasps(
       others: What lies beside it.
       drawn: How far a drawer is pulled out, in its frame [m]; None: it is none.
       cavity_world: `T_world_cavity`; the arm has to reach the grasps then. None: it may stand anywhere.
+      towards: As of `hands_around`.
     """
     if cavity_world is not None:
         grasps = replace(grasps, clear=grasps.clear & _reached(cavity_world @ pose @ grasps.poses))
-    hands = hands_around(grasps, stable, pose[:3, :3], outwards)
+    hands = hands_around(grasps, stable, pose[:3, :3], outwards, towards)
     return count_clear(hands, pose[:3, 3], cavity, outwards, others, drawn)
 
 
@@ -71,6 +73,7 @@ def hands_around(
     stable: int,
     rotation: Float[np.ndarray, "3 3"],
     outwards: Float[np.ndarray, "3"],
+    towards: float = STRAIGHT,
 ) -> Float[np.ndarray, "k b 8 3"]:
     """Corners of the hand and its fingers at the grasps that come through the open side.
 
@@ -79,13 +82,14 @@ def hands_around(
       stable: Index of the stable pose it lies in.
       rotation: `R_cavity_object`.
       outwards: Unit vector through the open side, in the cavity's frame.
+      towards: Cosine between approach and the way in from which on a grasp comes through it.
 
     Returns:
       From the object's origin, along the cavity's axes [m].
     """
     turned = rotation @ grasps.poses[:, :3, :3]
     usable = grasps.clear[:, stable].astype(bool) & (grasps.widths < MAX_WIDTH)
-    usable &= turned[:, :, 2] @ -outwards > _TOWARDS
+    usable &= turned[:, :, 2] @ -outwards > towards
     if not usable.any():
         return np.zeros((0, 4, 8, 3))
     hands = _hands(grasps.widths[usable])

@@ -11,7 +11,13 @@ import numpy as np
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.assets.categories import CATALOGUE, Category, Split
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.articulated.cavity_placement import ways_in_hand, ways_into, ways_stored
+from manipose_mj.tasks.articulated.cavity_placement import (
+    hand_towards,
+    ways_in_hand,
+    ways_into,
+    ways_stored,
+)
+from manipose_mj.tasks.articulated.hand_room import STRAIGHT
 from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part, possible_parts
 from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, chosen, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -110,13 +116,23 @@ class CavityDraw:
         self._stored = requested.stored
         self._split: Split = env_config.split
         self._taken, self._fillers = taken, fillers
-        # By folder and part: the object in question, and those that may lie beside it.
-        self._fitting: dict[tuple[str, str], tuple[Candidates, Candidates]] = {}
+        # By folder, part and whether the hand has to come straight: the object in question, and those that may lie
+        # beside it.
+        self._fitting: dict[tuple[str, str, bool], tuple[Candidates, Candidates]] = {}
 
     def __call__(self, rng: np.random.RandomState, spec: EpisodeSpec) -> SceneObjects:
+        """Objects to which the hand comes straight; tilted, where there are no others among those that are asked for."""
+        try:
+            return self._drawn(rng, spec, straight=True)
+        except InputError:
+            return self._drawn(rng, spec, straight=False)
+
+    def _drawn(
+        self, rng: np.random.RandomState, spec: EpisodeSpec, *, straight: bool
+    ) -> SceneObjects:
         for attempt in range(1, _PIECES + 1):
             asset, part = self._furniture.draw(rng, spec)
-            subjects, others = self._candidates(asset, part)
+            subjects, others = self._candidates(asset, part, straight)
             try:
                 objects = [subjects.draw(rng, spec.object)]
             except InputError:
@@ -134,27 +150,32 @@ class CavityDraw:
 
     def strata(self) -> Strata:
         """Pieces, each with its parts behind which something fits."""
-        groups = []
-        for group in self._furniture.strata():
-            fitting = [spec for spec in group if self._fits_something(spec)]
-            groups += [tuple(fitting)] if fitting else []
-        return tuple(groups)
+        for straight in (True, False):
+            groups = []
+            for group in self._furniture.strata():
+                fitting = [spec for spec in group if self._fits_something(spec, straight)]
+                groups += [tuple(fitting)] if fitting else []
+            if groups:
+                return tuple(groups)
+        return ()
 
-    def _fits_something(self, spec: EpisodeSpec) -> bool:
+    def _fits_something(self, spec: EpisodeSpec, straight: bool) -> bool:
         try:
-            self(np.random.RandomState(0), spec)
+            self._drawn(np.random.RandomState(0), spec, straight=straight)
         except InputError:
             return False
         return True
 
-    def _candidates(self, asset: Asset, part: MovingPart) -> tuple[Candidates, Candidates]:
-        key = str(asset.folder), part.name
+    def _candidates(
+        self, asset: Asset, part: MovingPart, straight: bool
+    ) -> tuple[Candidates, Candidates]:
+        key = str(asset.folder), part.name, straight
         if key not in self._fitting:
             assert part.cavity is not None
             pool = self._own or _shorter_than(
                 float(np.linalg.norm(part.cavity.extents)), self._split, self._stored
             )
-            own_check = partial(_subject, part=part, taken=self._taken)
+            own_check = partial(_subject, part=part, taken=self._taken, straight=straight)
             beside = partial(ways_into, part=part)
             self._fitting[key] = Candidates(pool, own_check), Candidates(pool, beside)
         return self._fitting[key]
@@ -175,8 +196,10 @@ def with_cavity(requested: RequestedFurniture, *, taken: bool, fillers: int) -> 
     return make
 
 
-def _subject(asset: Asset, *, part: MovingPart, taken: bool) -> None:
+def _subject(asset: Asset, *, part: MovingPart, taken: bool, straight: bool) -> None:
     require_graspable(asset)
+    if straight and hand_towards(asset, part) != STRAIGHT:
+        raise InputError(f"part {part.name!r}: the hand comes to {asset.name} tilted only")
     (ways_in_hand if taken else ways_stored)(asset, part)
 
 

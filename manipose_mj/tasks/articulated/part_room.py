@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, Cavity, MovingPart
 from manipose_mj.poses import compose
-from manipose_mj.tasks.articulated.hand_room import Placement, free_grasps
+from manipose_mj.tasks.articulated.hand_room import STRAIGHT, Placement, free_grasps
 
 _PULLED = 0.95  # of its range, a drawer that somebody reaches into
 _UP = np.array([0.0, 0.0, 1.0])
@@ -22,6 +22,7 @@ def room_at(
     pose: Float[np.ndarray, "4 4"],
     others: Sequence[Placement] = (),
     cavity_world: Float[np.ndarray, "4 4"] | None = None,
+    towards: float = STRAIGHT,
 ) -> int:
     """How many grasps have room for the hand, from above, or for what is behind a door from the front.
 
@@ -32,6 +33,7 @@ def room_at(
       pose: `T_cavity_object`.
       others: What lies beside it.
       cavity_world: `T_world_cavity` with the part shut; the arm has to reach the grasps then, with it open.
+      towards: As of `hands_around`.
     """
     if asset.grasps is None:
         return 0
@@ -43,7 +45,9 @@ def room_at(
             cavity_world = cavity_world @ compose(np.eye(3), np.append(drawn, 0.0))
     else:
         outwards = np.append(outwards_of(part), 0.0)
-    return free_grasps(asset.grasps, stable, pose, cavity, outwards, others, drawn, cavity_world)
+    return free_grasps(
+        asset.grasps, stable, pose, cavity, outwards, others, drawn, cavity_world, towards
+    )
 
 
 def outwards_of(part: MovingPart) -> Float[np.ndarray, "2"]:

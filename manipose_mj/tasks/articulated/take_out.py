@@ -95,7 +95,8 @@ class TakeOut(CavityTask):
         at, room = invert(cavity) @ pose, cavity_of(self.part).extents
         if at[2, 3] < entity.asset.stable_poses[stable].height - room[2] / 2 - _SUNK:
             raise NoStartError(f"{entity.asset.name} fell through the grid of {piece}")
-        hands = room_at(entity.asset, self.part, stable, at, cavity_world=cavity)
+        towards = self.placement.towards
+        hands = room_at(entity.asset, self.part, stable, at, cavity_world=cavity, towards=towards)
         if hands < _LEAST:
             raise NoStartError(
                 f"{entity.asset.name} came to rest in {piece} where no hand gets at it"

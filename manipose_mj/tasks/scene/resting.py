@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, radians
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.errors import InputError
@@ -70,15 +70,23 @@ def label_ups(asset: Asset) -> Float[np.ndarray, "s 3"]:
     return np.stack([pose.rotation[2] @ asset.label.rotation for pose in asset.stable_poses])
 
 
-def usable_poses(asset: Asset) -> list[int]:
-    """Stable poses that come up in real use and in which the gripper can take the object."""
-    assert asset.grasps is not None
+def resting_in_use(asset: Asset) -> list[int]:
+    """Stable poses that come up in real use: the likely ones, and upright and upside down."""
     upright = np.abs(label_ups(asset)[:, 0]) > _UPRIGHT
     return [
         index
         for index, pose in enumerate(asset.stable_poses)
-        if (pose.probability >= MIN_PROBABILITY or upright[index])
-        and asset.grasps.clear[:, index].sum() >= MIN_SHARED_GRASPS
+        if pose.probability >= MIN_PROBABILITY or upright[index]
+    ]
+
+
+def usable_poses(asset: Asset) -> list[int]:
+    """Stable poses that come up in real use and in which the gripper can take the object."""
+    assert asset.grasps is not None
+    return [
+        index
+        for index in resting_in_use(asset)
+        if asset.grasps.clear[:, index].sum() >= MIN_SHARED_GRASPS
     ]
 
 
@@ -94,8 +102,13 @@ def placements_between(asset: Asset) -> Int[np.ndarray, "s s"]:
     would do. Only the object and the table count: the arm may need more.
     """
     assert asset.grasps is not None
-    clear = asset.grasps.clear.astype(int)
-    joined = (clear.T @ clear) >= MIN_SHARED_GRASPS
+    return placements_joining(asset.grasps.clear, MIN_SHARED_GRASPS)
+
+
+def placements_joining(clear: Bool[np.ndarray, "n s"], least: int) -> Int[np.ndarray, "s s"]:
+    """`placements_between` of grasps that are `clear` in stable poses, where `least` of them make a move."""
+    count_clear = clear.astype(int)
+    joined = (count_clear.T @ count_clear) >= least
     needed = np.where(joined, 0, -1)
     reached = joined
     for count in range(1, MAX_PLACEMENTS + 1):

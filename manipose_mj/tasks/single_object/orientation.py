@@ -13,6 +13,7 @@ from manipose_mj.poses import pose_error
 from manipose_mj.tasks.core.config import EnvConfig, TaskConfig
 from manipose_mj.tasks.core.start import EpisodeStart
 from manipose_mj.tasks.goals import OrientationGoal
+from manipose_mj.tasks.scene.overhang import edge_pairs
 from manipose_mj.tasks.scene.resting import placements_between, pose_on_table, usable_poses
 from manipose_mj.tasks.single_object.task import SingleObjectTask, shown_beside, single_object_start
 
@@ -82,6 +83,8 @@ def orientation_pairs(asset: Asset, min_turn: float) -> list[tuple[int, int]]:
     ]
     # What lies on one side only is turned about the vertical.
     pairs = [(i, j) for i, j in pairs if i != j] or pairs
+    # What lies on its rim is set down over the edge of the table.
+    pairs = pairs or edge_pairs(asset)
     if not pairs:
         raise InputError(
             f"{asset.folder}: {asset.name} has no stable pose that the gripper can turn it to "
