@@ -18,6 +18,7 @@ from manipose_mj.tasks.core.start import NoStartError
 
 # Budgets of plans, each with a seed of its own: first what an evaluation has, at last three times as many.
 BUDGETS = (MAX_PLANS, MAX_PLANS, 3 * MAX_PLANS)
+UNDRAWN = "start"  # the stage at which a start fails that cannot be drawn
 
 
 def attempts(seed: int) -> tuple[Certificate, ...]:
@@ -96,7 +97,7 @@ def _outcome(
                 plans=attempt.plans,
             )
         except NoStartError as error:
-            return start, f"start: {error}"
+            return start, f"{UNDRAWN}: {error}"
         if result.success_at_end:
             return start, attempt
         reason = f"{result.failure}: {result.reason}"

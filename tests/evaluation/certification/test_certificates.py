@@ -20,9 +20,10 @@ from manipose_mj.evaluation.certification.certificates import (
     save_certificates,
 )
 from manipose_mj.evaluation.certification.redraw import redrawn
-from manipose_mj.evaluation.certification.search import attempts, chosen_starts, verify
+from manipose_mj.evaluation.certification.search import UNDRAWN, attempts, chosen_starts, verify
 from manipose_mj.evaluation.protocol.frozen import digest, evaluation_seed, protocol_path
 from manipose_mj.failures import STAGES
+from manipose_mj.tasks.core.start import NoStartError
 
 V1 = protocol.load("v1")
 SHIPPED = load_certificates(V1)
@@ -116,7 +117,8 @@ def test_shipped_certificates_are_of_starts_that_exist():
     for task, number in (*SHIPPED.solved, *SHIPPED.unsolved):
         V1.episode(task, number)
     assert not SHIPPED.solved.keys() & SHIPPED.unsolved.keys()
-    assert all(reason.partition(":")[0] in STAGES for reason in SHIPPED.unsolved.values())
+    stages = {*STAGES, UNDRAWN}
+    assert all(reason.partition(":")[0] in stages for reason in SHIPPED.unsolved.values())
     assert {task for task, _ in (*SHIPPED.solved, *SHIPPED.unsolved)} == set(V1.tasks)
 
 
@@ -151,3 +153,12 @@ def test_a_certificate_that_no_longer_holds_is_exit_1_with_its_reason(
     said = capsys.readouterr().out
     assert f"{TASK} 0: grasp: it slipped" in said
     assert "1 of 2 certificates hold; of 4 starts, 1 are known as unsolved and 1 untried" in said
+
+
+def test_a_start_that_cannot_be_drawn_is_unsolved_and_stops_nothing(monkeypatch):
+    def draw_none(*_, **__):
+        raise NoStartError("a spoon lies where no hand gets at it")
+
+    monkeypatch.setattr(search, "run_episode", draw_none)
+    found = search._outcome("v1", (TASK, 0), None)
+    assert found == ((TASK, 0), "start: a spoon lies where no hand gets at it")
