@@ -32,6 +32,7 @@ ORDER = (
     ("manipose_mj.mjcf",),
     ("manipose_mj.grasp_sampling",),
     ("manipose_mj.assets",),
+    ("manipose_mj.user_code",),
     ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
     ("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
 )

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.actions.tcp_motion import euler_angles
-from manipose_mj.mjcf.panda.robot import MAX_OPENING
+from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import Array, compose, invert, rotation_to_quaternion, vector_to_pose
 
 CONTROL_MODE, OBS_MODE = "pd_ee_pose", "state+pose"
@@ -66,6 +67,15 @@ def tcp_pose(observation: Observation) -> Float[Array, "*b 4 4"]:
 def pose_features(pose: Float[Array, "*b 4 4"]) -> tuple[Array, Array, Array]:
     """Position, and two columns of the rotation."""
     return pose[..., :3, 3], pose[..., :3, 0], pose[..., :3, 1]
+
+
+def robot_features(observation: Observation) -> tuple[Array, Array, Array]:
+    """Opening of the gripper, joint angles from home, joint velocities."""
+    return (
+        observation["panda/gripper_opening"] / MAX_OPENING,
+        observation["panda/joint_positions"] - HOME.astype(np.float32),
+        0.2 * observation["panda/joint_velocities"],
+    )
 
 
 def rotation_matrix(vector: Float[Array, "*b 3"]) -> Float[Array, "*b 3 3"]:

@@ -8,12 +8,10 @@ turns about z it is the one nearer to the hand. Pure functions of observations w
 from __future__ import annotations
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.learning import grip
 from manipose_mj.learning.grip import Observation
-from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import Array, compose, invert
 
 NEEDS: str = "a task about one object"
@@ -49,9 +47,7 @@ def features(observation: Observation) -> Float[Array, "*b n"]:
         *grip.pose_features(to_grip @ grip.tcp_pose(observation)),
         *label,
         to_grip[..., :3, 3],  # the robot's base, which is as high as the table
-        observation["panda/gripper_opening"] / MAX_OPENING,
-        observation["panda/joint_positions"] - HOME.astype(np.float32),
-        0.2 * observation["panda/joint_velocities"],
+        *grip.robot_features(observation),
     )
     return jnp.concatenate(seen, axis=-1).astype(jnp.float32)
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import os
-import sys
 from functools import lru_cache
 from typing import Any
 
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.policies.client import RemotePolicy
 from manipose_mj.policies.protocol import Policy
+from manipose_mj.user_code import import_user_module, search_working_folder
 from manipose_mj.wire.client import is_address
 
 
@@ -83,15 +81,8 @@ def _factory(name: str) -> Any:
     module_name, colon, attribute = name.partition(":")
     if not (module_name and colon and attribute):
         raise InputError(f"--policy {name}: expected package.module:Factory or ws://host:port")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        module = importlib.import_module(module_name)
-    except Exception as error:  # whatever a stranger's code raises
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(
-            f"--policy {name}: cannot import {module_name} ({reason[:300]})"
-        ) from error
+    search_working_folder()
+    module = import_user_module(module_name, f"--policy {name}")
     factory: Any = module
     for part in attribute.split("."):
         if not hasattr(factory, part):

@@ -24,7 +24,7 @@ from manipose_mj.tasks.core.task import ManipulationTask
 
 log = logging.getLogger(__name__)
 
-_STARTS = 40  # of one episode, before a reset gives up: in a low drawer one of ten may do
+_STARTS = 40  # of one episode, before a reset gives up; for a low drawer twelve were too few
 _SCENES_KEPT = 7  # besides the present one
 
 
