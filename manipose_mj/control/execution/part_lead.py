@@ -25,7 +25,9 @@ _FIRST = 0.02  # way after which the joint is corrected whatever it is [m]
 _STUCK = 0.030  # how far the hand may stay behind its path [m]
 _STILL = 0.0015  # and move meanwhile, in a quarter of a second [m]
 _PATIENCE = 12  # control steps
-_SLIPPED = 0.003  # change of the gripper's opening with which it loses the handle [m]
+# Changes of the gripper's opening with which it loses the handle: between two looks [m], since it closed [m], and the
+# same as a share of what it was then. A bar that is not round is of another width as it turns in the grip.
+_SLIPS, _SLIPPED, _SLIPPED_SHARE = 0.002, 0.003, 0.4
 _MOST = 14  # corrections
 _FURTHER = {"slide": 1.35, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
 _ENOUGH = {
@@ -36,12 +38,20 @@ _ENOUGH = {
 
 @dataclass
 class _Trace:
-    """Attributes: path: of the TCP, world frame [m]; width: of the gripper on the handle [m]; stopped: whether the
-    part went no further."""
+    """Attributes: path: of the TCP, world frame [m]; width: of the gripper once it had closed on the handle [m];
+    last_width: the same at the last look [m]; stopped: whether the part went no further."""
 
     path: list[np.ndarray]
     width: float
+    last_width: float
     stopped: bool = False
+
+    def slips(self, width: float) -> bool:
+        """Whether a gripper that is open so far [m] by now loses the handle."""
+        most = max(_SLIPPED, _SLIPPED_SHARE * self.width)
+        slips = abs(width - self.last_width) > _SLIPS or abs(width - self.width) > most
+        self.last_width = width
+        return slips
 
 
 def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: float) -> Actions:
@@ -60,7 +70,8 @@ def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: fl
       StageFailure: The hand cannot lead it on, far from the opening.
     """
     estimate = executor.observe()
-    trace = _Trace([_tcp(executor.joints())], executor.opening())
+    width = executor.opening()
+    trace = _Trace([_tcp(executor.joints())], width, width)
     started = estimate.parts[name].opening
     for _ in range(_MOST):
         part = estimate.parts[name]
@@ -115,7 +126,7 @@ def _follow(executor: Executor, way: PartWay, trace: _Trace) -> Iterator[Action]
         if step % _EVERY:
             continue
         now = _tcp(executor.joints())
-        if abs(executor.opening() - trace.width) > _SLIPPED:
+        if trace.slips(executor.opening()):
             # It slips off what goes no further.
             trace.path = trace.path[:-1] if len(trace.path) > 2 else trace.path
             trace.stopped = True

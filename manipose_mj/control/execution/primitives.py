@@ -50,8 +50,9 @@ _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
 _STAGES = 6  # the same, where each may lead it less far than all the way
 _IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
-# How far beyond the shut place a part is pushed whose place is estimated [m, rad].
+# How far beyond where it should be shut, or open, a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
+_BEYOND_OPEN = {"slide": 0.0, "hinge": 0.08}
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
 
@@ -274,8 +275,11 @@ class Primitives:
         yield from self._executor.close()
         estimate, planner = self._observe(planner)
         part = estimate.parts[name]
-        beyond = _BEYOND_SHUT[part.joint.kind] if self._executor.feels_joints else 0.0
-        aim = opening - beyond if opening <= part.joint.range[0] else opening
+        aim = opening
+        if self._executor.feels_joints:
+            shuts = opening <= part.joint.range[0]
+            kind = part.joint.kind
+            aim = opening - _BEYOND_SHUT[kind] if shuts else opening + _BEYOND_OPEN[kind]
         in_vain = self._in_vain.get(name, ())
         push = push_part(planner, estimate, part, aim, in_vain, in_stages=self.in_stages)
         yield from self._executor.follow(push.free_path)

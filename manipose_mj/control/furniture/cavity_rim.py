@@ -22,6 +22,8 @@ _STEP, _LEVEL = 0.004, 0.006  # between heights of surfaces, and of points from 
 _CELL = 0.02  # of a surface, seen from above [m]
 _WIDE = 0.4  # share of the cells of the widest surface that a surface has that carries objects
 _SAME, _SAME_SHARE = 0.016, 0.5  # heights of one surface [m]; of its points, at its top
+_BOARD = 0.02  # thickness of a shelf [m]
+_AS_TALL = 0.8  # share of the height of the tallest space
 
 
 @dataclass(frozen=True)
@@ -83,19 +85,34 @@ def _side(values: Float[np.ndarray, "n"], middle: float, sign: float) -> float |
     return middle + sign * float(edges[int(full.argmax())]) if full.any() else None
 
 
-def supporting_level(
+@dataclass(frozen=True)
+class Compartment:
+    """Attributes: floor: what objects stand on; roof: what is above them [m]."""
+
+    floor: float
+    roof: float
+
+
+def tallest_compartment(
     points: Float[np.ndarray, "n 3"],
     inside: Bool[np.ndarray, "n"],
     normals: Float[np.ndarray, "n 3"],
-) -> float | None:
-    """Height of the uppermost wide surface: a rack is over the floor that shows through it [m]; None if there is none.
+    roof: float,
+) -> Compartment | None:
+    """The tallest space between wide surfaces, as shelves divide it; of nearly equal ones the lowest.
+
+    A rack is over the floor that shows through it.
 
     Args:
       points: Object frame [m].
-      inside: Which of them may be of it.
+      inside: Which of them may be of such surfaces.
       normals: Of all points.
+      roof: Above the uppermost [m].
+
+    Returns:
+      The space; None where no surface shows.
     """
-    seen = points[inside & (normals[:, 2] > _FLAT)]
+    seen = points[inside & (normals[:, 2] > _FLAT) & (points[:, 2] < roof)]
     if len(seen) < _LEAST:
         return None
     heights = np.arange(seen[:, 2].min(), seen[:, 2].max() + _STEP, _STEP)
@@ -105,5 +122,11 @@ def supporting_level(
     near = np.abs(heights[:, None] - heights[None]) < _SAME
     fullest = np.where(near, number[None], 0).max(axis=1)
     carries = (cells >= _WIDE * cells.max()) & (number >= _SAME_SHARE * fullest)
-    top = int(np.flatnonzero(carries)[-1])
-    return float(np.median(seen[rows[top], 2]))
+    wide = np.flatnonzero(carries)
+    # The top of each surface.
+    tops = wide[np.append(np.diff(heights[wide]) > _SAME, True)]
+    floors = [float(np.median(seen[rows[top], 2])) for top in tops]
+    roofs = [*(floor - _BOARD for floor in floors[1:]), roof]
+    tall = np.subtract(roofs, floors)
+    chosen = int(np.flatnonzero(tall >= _AS_TALL * tall.max())[0])
+    return Compartment(floors[chosen], roofs[chosen])

@@ -14,7 +14,10 @@ from scipy.optimize import least_squares
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.poses import rotation_about
 
-_NOISE = 0.0015  # of the gripper on a bar [m]
+_NOISE = 0.0015  # of the gripper on a bar, at most [m]
+_LEAST_NOISE = (
+    0.0003  # the same where it holds it well: it then keeps to a hinge's arc to some 0.1 mm [m]
+)
 _AXIS = np.radians(15.0)  # standard deviations of what clouds say: of an axis' direction,
 _PLACE = 0.06  # and of a hinge's place [m]
 _SHORT = 0.006  # ways that are shorter tell nothing [m]
@@ -81,18 +84,23 @@ def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
             axis = rotation_about(turn / angle, angle) @ axis
         return axis, foot + basis @ by[2:]
 
-    def residuals(by: np.ndarray) -> np.ndarray:
-        axis, place = changed(by)
-        out, high = _off_circle(path, axis, place)
-        return np.concatenate([out / _NOISE, high / _NOISE, by[:2] / _AXIS, by[2:] / _PLACE])
+    def misfit(by: np.ndarray) -> float:
+        out, high = _off_circle(path, *changed(by))
+        return float(np.sqrt((out**2 + high**2).mean()))
 
-    found = least_squares(residuals, np.zeros(4), loss="soft_l1", max_nfev=60).x
+    def residuals(by: np.ndarray, noise: float) -> np.ndarray:
+        out, high = _off_circle(path, *changed(by))
+        return np.concatenate([out / noise, high / noise, by[:2] / _AXIS, by[2:] / _PLACE])
+
+    # A path is trusted as far as it is an arc.
+    found, noise = np.zeros(4), _LEAST_NOISE
+    for _ in range(2):
+        found = least_squares(residuals, found, args=(noise,), loss="soft_l1", max_nfev=60).x
+        noise = float(np.clip(misfit(found), _LEAST_NOISE, _NOISE))
     axis, place = changed(found)
     if np.linalg.norm(np.cross(path[0] - place, axis)) < _LEAST_RADIUS:
         return FittedJoint(joint, float("inf"))
-    out, high = _off_circle(path, axis, place)
-    misfit = float(np.sqrt((out**2 + high**2).mean()))
-    return FittedJoint(replace(joint, axis=axis, origin=place), misfit)
+    return FittedJoint(replace(joint, axis=axis, origin=place), misfit(found))
 
 
 def _hinge_of(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint | None:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
-from manipose_mj.control.furniture.cavity_rim import seen_rim, supporting_level
+from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import invert, transform
@@ -91,13 +91,13 @@ def _door(
     if inside.sum() < 4 * _LEAST:
         return measured
     floor, left, right = _floor_and_sides(points, normals, inside, part.panel)
-    below = inside & (points[:, 2] < (low[2] + 2 * high[2]) / 3)
-    supporting = supporting_level(points, below, normals)
-    floor = floor if supporting is None else supporting + 0.001
     rim = seen_rim(points, normals, part.panel)
     left = left if rim.left is None else max(left, rim.left + _SIDE_MARGIN)
     right = right if rim.right is None else min(right, rim.right - _SIDE_MARGIN)
     roof = high[2] - max(_ROOF, 0.02) if rim.roof is None else rim.roof - _RIM_ROOF
+    space = tallest_compartment(points, inside, normals, roof)
+    if space is not None:
+        floor, roof = space.floor + 0.001, space.roof
     mouth = front - 0.018 if rim.mouth is None else rim.mouth
     # The rear: where most points look out of the front, those of the frame around the opening left out.
     behind = inside & (points[:, 0] < mouth - _BEHIND_MOUTH)

@@ -289,9 +289,13 @@ def poses_in_cavity(
     found = []
     rotations = _ways_to_turn(obj)
     towards = _hand_towards(obj, rotations, open_side)
-    for rotation in rotations:
-        reach = obj.label.reach(rotation)
-        slack = (cavity.extents - CAVITY_MARGIN) / 2 - reach
+    room = (cavity.extents - CAVITY_MARGIN) / 2
+    boxes = [(rotation @ obj.label.center, obj.label.reach(rotation)) for rotation in rotations]
+    if estimate is not None and not any((reach <= room).all() for _, reach in boxes):
+        # A box around a box that is tilted is larger than one around what tapers.
+        boxes = [_tight_box(obj, estimate, rotation) for rotation in rotations]
+    for rotation, (middle, reach) in zip(rotations, boxes, strict=True):
+        slack = room - reach
         if (slack < 0).any():
             continue
         height = resting_height(obj, rotation) if obj.rests else reach[2]
@@ -299,7 +303,7 @@ def poses_in_cavity(
         other_side = float(rotation[2] @ down) < _SAME_SIDE
         hands = _hands(obj, rotation, open_side, towards)
         # From the middle of its box to the label's origin, and on to the object's.
-        to_label = -(rotation @ obj.label.center) * [1, 1, 0]
+        to_label = -middle * [1, 1, 0]
         to_object = to_label - rotation @ obj.label.rotation.T @ obj.label.origin
         places = []
         for sideways in _SIDEWAYS:
@@ -309,15 +313,24 @@ def poses_in_cavity(
                     continue
                 # Without grasps that are known to come from there, any place is as good.
                 at = floor + place_ + to_object
-                room = count_clear(hands, at, cavity, open_side, taken, drawn)
-                places.append((-min(room, _ENOUGH_HANDS), abs(sideways), -share, place_))
+                clear = count_clear(hands, at, cavity, open_side, taken, drawn)
+                places.append((-min(clear, _ENOUGH_HANDS), abs(sideways), -share, place_))
         # Stable: of places with as much room those come first that come first above.
         places.sort(key=lambda entry: entry[0])
-        for room, off, back, place_ in places[:_MAX_PER_WAY]:
+        for clear, off, back, place_ in places[:_MAX_PER_WAY]:
             pose = carrier @ compose(rotation, cavity.center + floor + place_ + to_label)
-            found.append((other_side, room, round(reach[2], 4), off, back, pose))
+            found.append((other_side, clear, round(reach[2], 4), off, back, pose))
     found.sort(key=lambda entry: entry[:5])
     return tuple(entry[5] for entry in found)
+
+
+def _tight_box(
+    obj: ObjectEstimate, estimate: SceneEstimate, rotation: Float[np.ndarray, "3 3"]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Middle, from the label's origin, and half the lengths of the box around an object whose label is turned so."""
+    corners = obj.corners(estimate.scene) @ rotation.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return (low + high) / 2, (high - low) / 2
 
 
 def _hand_towards(

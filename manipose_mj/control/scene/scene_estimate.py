@@ -14,8 +14,9 @@ from jaxtyping import Bool, Float
 from manipose_mj.assets.asset import Cavity, GraspSet, Joint, StablePose
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.scene.collision_query import AttachedObject, FixedObject
+from manipose_mj.control.scene.geom_corners import geom_corners
 from manipose_mj.control.scene.planning_scene import PlanningScene
-from manipose_mj.poses import invert
+from manipose_mj.poses import invert, transform
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,12 @@ class ObjectEstimate:
     ) -> AttachedObject:
         """The object at `T_tcp_object` in a hand; `opening` as of `attached_to`."""
         return AttachedObject(self.body, self.geoms, pose_tcp, opening, self.uncertainty)
+
+    def corners(self, scene: PlanningScene) -> Float[np.ndarray, "v 3"]:
+        """Points whose convex hull is the object's, label frame [m]."""
+        geoms = np.flatnonzero(self.geoms)
+        corners = [geom_corners(scene.model, int(geom)) for geom in geoms]
+        return transform(invert(self.label.pose), np.concatenate(corners))
 
     def placed_at(self, label_pose: Float[np.ndarray, "4 4"]) -> FixedObject:
         """The object with its label at `T_world_label`."""

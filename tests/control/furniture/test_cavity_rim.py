@@ -9,7 +9,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.cavity_rim import seen_rim, supporting_level
+from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
@@ -64,8 +64,24 @@ def test_without_a_frame_nothing_is_said_of_it():
 @pytest.mark.parametrize(("rack", "height"), [(False, FLOOR), (True, RACK)])
 def test_objects_stand_on_a_rack_though_the_floor_shows_through_it(rack, height):
     points, normals = oven(rack)
-    inside = (points[:, 0] < MOUTH - 0.01) & (points[:, 2] < 0.2)
-    assert supporting_level(points, inside, normals) == pytest.approx(height, abs=0.003)
+    inside = points[:, 0] < MOUTH - 0.01
+    space = tallest_compartment(points, inside, normals, ROOF)
+    assert space is not None
+    assert (space.floor, space.roof) == (pytest.approx(height, abs=0.003), ROOF)
+
+
+@pytest.mark.parametrize(
+    ("shelves", "floor", "roof"),
+    [((0.145,), FLOOR, 0.125), ((0.10,), 0.10, ROOF), ((0.16, 0.21), FLOOR, 0.14)],
+)
+def test_shelves_divide_what_is_behind_a_door(shelves, floor, roof):
+    points, normals = oven(rack=False)
+    boards = [sheet([REAR, LEFT, z], [MOUTH, RIGHT, z], Z) for z in shelves]
+    points = np.concatenate([points, *(board[0] for board in boards)])
+    normals = np.concatenate([normals, *(board[1] for board in boards)])
+    space = tallest_compartment(points, points[:, 0] < MOUTH - 0.01, normals, ROOF)
+    assert space is not None
+    assert [space.floor, space.roof] == pytest.approx([floor, roof], abs=0.003)
 
 
 def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():

@@ -22,8 +22,9 @@ from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.assets.geometry import Body, MassProperties, Shape
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
+from manipose_mj.control.scene.geom_corners import geom_corners
 from manipose_mj.grasp_sampling.sampler import sample_grasps
-from manipose_mj.poses import SymmetryGroup, compose, invert, transform
+from manipose_mj.poses import SymmetryGroup, invert, transform
 
 SHAPES = 8  # training objects of a category that are known: its styles take turns among them
 _SURFACE_POINTS = 1500
@@ -31,7 +32,6 @@ _ALIKE = 0.04  # relative difference of two lengths from which on a turn no long
 _FAR = (
     0.02  # a point further from the surface counts as this far: it is noise or somebody else's [m]
 )
-_ROUND = 16  # corners that a circle is drawn with
 
 
 @dataclass(frozen=True)
@@ -153,41 +153,7 @@ def shape_of(asset: Asset) -> KnownShape:
 def _collision_hulls(asset: Asset) -> list[Float[np.ndarray, "_ 3"]]:
     """Vertices of the convex parts of an asset, object frame [m]."""
     model = mujoco.MjModel.from_xml_path(str(asset.model_path))
-    found = []
-    for geom in np.flatnonzero(model.geom_contype):
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        pose = compose(rotation.reshape(3, 3), model.geom_pos[geom].copy())
-        found.append(transform(pose, _corners(model, int(geom))))
-    return found
-
-
-def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "v 3"]:
-    """Points whose convex hull is a geom, of round ones nearly, in the geom's frame [m]."""
-    kind, size = model.geom_type[geom], model.geom_size[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = int(model.geom_dataid[geom])
-        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        return model.mesh_vert[first : first + count].astype(float)
-    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return signs * size
-    angle = np.linspace(0, 2 * np.pi, _ROUND, endpoint=False)
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) * size[0]
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        levels = [(1.0, -size[1]), (1.0, size[1])]
-    else:
-        half = float(size[1]) if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0
-        tilts = np.linspace(-np.pi / 2, np.pi / 2, 9)
-        levels = [(np.cos(t), np.sign(t) * half + np.sin(t) * size[0]) for t in tilts]
-        if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            unit = np.concatenate(
-                [np.column_stack([circle / size[0] * np.cos(t), np.full(_ROUND, np.sin(t))]) for t in tilts]
-            )  # fmt: skip
-            return unit * size
-    return np.concatenate(
-        [np.column_stack([circle * share, np.full(_ROUND, height)]) for share, height in levels]
-    )
+    return [geom_corners(model, int(geom)) for geom in np.flatnonzero(model.geom_contype)]
 
 
 def _kept(symmetry: SymmetryGroup, extents: Float[np.ndarray, "3"]) -> SymmetryGroup:
