@@ -25,8 +25,8 @@ _FIRST = 0.02  # way after which the joint is corrected whatever it is [m]
 _STUCK = 0.030  # how far the hand may stay behind its path [m]
 _STILL = 0.0015  # and move meanwhile, in a quarter of a second [m]
 _PATIENCE = 12  # control steps
-# Changes of the gripper's opening with which it loses the handle: between two looks [m], since it closed [m], and the
-# same as a share of what it was then. A bar that is not round is of another width as it turns in the grip.
+# By how much the gripper closes as it loses the handle: between two looks [m], since it closed on it [m], and the same as
+# a share of its opening then. A bar that is not round is of another width as it turns in the grip.
 _SLIPS, _SLIPPED, _SLIPPED_SHARE = 0.002, 0.003, 0.4
 _MOST = 14  # corrections
 _FURTHER = {"slide": 1.35, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
@@ -49,7 +49,7 @@ class _Trace:
     def slips(self, width: float) -> bool:
         """Whether a gripper that is open so far [m] by now loses the handle."""
         most = max(_SLIPPED, _SLIPPED_SHARE * self.width)
-        slips = abs(width - self.last_width) > _SLIPS or abs(width - self.width) > most
+        slips = self.last_width - width > _SLIPS or self.width - width > most
         self.last_width = width
         return slips
 

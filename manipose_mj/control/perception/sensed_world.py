@@ -27,7 +27,6 @@ from manipose_mj.tasks.core.task import ManipulationTask
 
 _ROBOT = "panda"
 _BASE = f"{PREFIX}furniture"
-_BACKGROUND = 0  # of segmentations
 
 
 class SensedWorld:
@@ -53,7 +52,7 @@ class SensedWorld:
           front_cameras: Those that look at what the robot faces, the highest first.
           sense: Finds handles and joints.
         """
-        self._physics = physics
+        self._task, self._physics = task, physics
         self._views = SceneViews(task.task_observables, cameras)
         self._furniture = EstimatedFurniture(task, physics, self._views, front_cameras, sense)
         self._robot = _robot_alone()
@@ -79,8 +78,11 @@ class SensedWorld:
           StageFailure: A part that a goal is about is not found.
         """
         self._furniture.reset(key)
-        background = self._views.cloud(self._physics, _BACKGROUND, normals=False)
-        self._surroundings = surrounding_boxes(background.points)
+        clouds = [
+            self._views.cloud(self._physics, mask, normals=False).points
+            for mask in self._task.surroundings_masks
+        ]
+        self._surroundings = surrounding_boxes(np.concatenate(clouds))
 
     def build(self, shapes: Hulls) -> None:
         """Compile robot, boxes and objects."""

@@ -152,6 +152,13 @@ class ManipulationTask(composer.Task):
         return tuple((piece.asset.category, numbers[piece]) for piece in self.articulated_objects)
 
     @property
+    def surroundings_masks(self) -> tuple[int, ...]:
+        """Ids in segmentations of what stands around objects and furniture: all else, and fixtures such as a shelf."""
+        numbers = {entity: n for n, entity in enumerate(self.scene.instances.values(), start=1)}
+        fixtures = self.scene.fixtures.values()
+        return (0, *(numbers[each] for each in fixtures if each in numbers))
+
+    @property
     def object_name(self) -> str:
         """The asset that this episode is about."""
         return next(e.asset.name for e in (*self.objects.values(), *self.articulated_objects))
