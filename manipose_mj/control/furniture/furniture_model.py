@@ -15,6 +15,7 @@ from manipose_mj.control.furniture.boxes import Boxes, without
 from manipose_mj.poses import compose, rotation_about
 
 _TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]
+_TRAY_BEHIND = 0.02  # of a drawer that the body still covers when it is wide open: its back does not show [m]
 _BEFORE_FRONT = 0.03  # by how much a hole reaches out of the front [m]
 
 
@@ -107,6 +108,7 @@ class FurnitureModel:
 def _tray(cavity: Cavity, panel: Float[np.ndarray, "2 3"]) -> Boxes:
     """Floor, sides and back of a drawer around its cavity."""
     low, high = cavity.center - cavity.extents / 2, cavity.center + cavity.extents / 2
+    low[0] -= _TRAY_BEHIND
     end = panel[0, 0]
     top = high[2] - 0.015
     floor = [[low[0], low[1], low[2] - _TRAY_FLOOR], [end, high[1], low[2]]]
