@@ -294,10 +294,11 @@ def _named(
 
 
 def _candidate(part: PartModel) -> Candidate:
-    """How words see it: a drawer's handle is in its middle, a door's near an edge."""
+    """How words see it: a drawer is wide, with its handle in the middle; a door is high, with its near an edge."""
     low, high = part.panel[:, 1]
     middle = abs(float(_handle(part).origin[1]) - (low + high) / 2) / max(high - low, 0.01)
-    return Candidate(part.part, part.confidence, 2 * middle)
+    _, width, height = np.maximum(part.panel[1] - part.panel[0], 0.01)
+    return Candidate(part.part, part.confidence, 2 * middle, float(height / (height + width)))
 
 
 def _inside(

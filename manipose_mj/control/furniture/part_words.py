@@ -13,6 +13,7 @@ from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
 
 _OTHER_KIND = 1.5  # what a wrong kind costs, in places
 _LOOKS = 1.0  # and a handle that is where the other kind has it
+_SHAPE = 2.0  # and a front that is as high, or as wide, as the other kind's
 _UNSURE = 1.0  # what no confidence costs, in places
 _LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
 _FITS = 1.0  # places off, below which words fit
@@ -22,11 +23,12 @@ _SHARE = 2.0  # how many places the whole height, or width, counts for
 @dataclass(frozen=True)
 class Candidate:
     """A part that was found. Attributes: part; confidence; beside: how far its handle is from its panel's middle, of
-    half its width."""
+    half its width; upright: the height of its panel, of height and width together."""
 
     part: MovingPart
     confidence: float
     beside: float = 0.5
+    upright: float = 0.5
 
 
 def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
@@ -73,9 +75,11 @@ def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> floa
     column_cost = _place_cost(
         words, ("left", "middle", "right"), column, len(beside), _from_left(part), across
     )
-    # What a part is taken for may be wrong; where its handle is says as much.
-    looks = candidate.beside if noun == "drawer" else 1 - candidate.beside
-    return wrong * (_OTHER_KIND + _LOOKS * looks) + row_cost + column_cost
+    # What a part is taken for may be wrong; where its handle is, and its shape, say as much.
+    looks, shape = candidate.beside, candidate.upright
+    if noun == "door":
+        looks, shape = 1 - looks, 1 - shape
+    return wrong * (_OTHER_KIND + _LOOKS * looks + _SHAPE * shape) + row_cost + column_cost
 
 
 def _place_cost(
