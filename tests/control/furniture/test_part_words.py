@@ -63,10 +63,10 @@ def test_a_single_part_that_was_taken_for_another_kind_is_meant_still():
 
 
 def test_a_wide_front_is_a_drawers_though_all_were_taken_for_doors():
-    doors = [part("left", 0.2, 0.3, "hinge"), part("right", -0.2, 0.3, "hinge")]
+    doors = [part("one", 0.2, 0.3, "hinge"), part("other", -0.2, 0.3, "hinge")]
     wide = part("wide", 0.0, 0.6, "hinge")
     candidates = [Candidate(each, 0.6, 0.8, 0.6) for each in doors] + [
         Candidate(wide, 0.3, 0.6, 0.35)
     ]
     assert meant_part("drawer", candidates) == 2
-    assert meant_part("left door", candidates) == 0
+    assert meant_part("left door", candidates) == 1
