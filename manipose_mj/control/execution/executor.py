@@ -55,8 +55,8 @@ class Executor:
         """Of the gripper, as it is [m]."""
         return self._perception.robot()[1]
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
-        """Tell the perception which way a part went, world frame [m], and whether it went no further."""
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
+        """Tell the perception which way a part went, by `T_world_tcp`, and whether it went no further."""
         self._perception.feel(name, path, stopped)
 
     def pushed(self, name: str, opening: float) -> None:

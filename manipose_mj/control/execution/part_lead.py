@@ -21,7 +21,9 @@ from manipose_mj.failures import StageFailure
 _HELD = replace(CONTACT, arm=-0.004, target=-0.02)
 _EVERY = 4  # control steps between looks at where the hand is
 _BESIDE = 0.004  # how far the hand may be beside its path before the joint is corrected [m]
-_FIRST = 0.02  # way after which the joint is corrected whatever it is [m]
+# Way after which the joint is corrected whatever it is [m], and how often: fingers that are led astray slide on a bar, and
+# tell nothing any more.
+_FIRST, _AT_FIRST = 0.02, 4
 _STUCK = 0.030  # how far the hand may stay behind its path [m]
 _STILL = 0.0015  # and move meanwhile, in a quarter of a second [m]
 _PATIENCE = 12  # control steps
@@ -38,7 +40,7 @@ _ENOUGH = {
 
 @dataclass
 class _Trace:
-    """Attributes: path: of the TCP, world frame [m]; width: of the gripper once it had closed on the handle [m];
+    """Attributes: path: `T_world_tcp`; width: of the gripper once it had closed on the handle [m];
     last_width: the same at the last look [m]; stopped: whether the part went no further."""
 
     path: list[np.ndarray]
@@ -73,12 +75,14 @@ def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: fl
     width = executor.opening()
     trace = _Trace([_tcp(executor.joints())], width, width)
     started = estimate.parts[name].opening
-    for _ in range(_MOST):
+    for count in range(_MOST):
         part = estimate.parts[name]
         way = _way(planner.within(estimate.scene), estimate, part, started, opening)
         if way is None:
             break
-        done = yield from _follow(executor, way, trace)
+        hinge = part.joint.kind == "hinge"
+        short = count < (_AT_FIRST if hinge else 1)
+        done = yield from _follow(executor, way, trace, short)
         executor.feel(name, np.array(trace.path), trace.stopped)
         yield from executor.relax()
         estimate = executor.observe()
@@ -110,16 +114,15 @@ def _way(
     return None if way is None else ending_free(planner, part, way, _HELD)
 
 
-def _follow(executor: Executor, way: PartWay, trace: _Trace) -> Iterator[Action]:
-    """Go along a way until it ends, the hand leaves it, or goes no further.
+def _follow(executor: Executor, way: PartWay, trace: _Trace, short: bool) -> Iterator[Action]:
+    """Go along a way until it ends, the hand leaves it, or goes no further; a `short` piece of it at most.
 
     Returns:
       Whether it came to the end.
     """
     targets = way.targets(executor.timestep)
     places = forward(targets)[0][:, :3, 3]
-    begun = trace.path[-1]
-    short = len(trace.path) < 4
+    begun = trace.path[-1][:3, 3]
     recent: list[np.ndarray] = []
     for step, target in enumerate(targets):
         yield executor.send(target)
@@ -132,14 +135,15 @@ def _follow(executor: Executor, way: PartWay, trace: _Trace) -> Iterator[Action]
             trace.stopped = True
             return False
         trace.path.append(now)
-        recent = [*recent, now][-(_PATIENCE // _EVERY) - 1 :]
-        beside = float(np.linalg.norm(places[: step + 1] - now, axis=1).min())
-        behind = float(np.linalg.norm(places[step] - now))
+        place = now[:3, 3]
+        recent = [*recent, place][-(_PATIENCE // _EVERY) - 1 :]
+        beside = float(np.linalg.norm(places[: step + 1] - place, axis=1).min())
+        behind = float(np.linalg.norm(places[step] - place))
         still = len(recent) > _PATIENCE // _EVERY and _reach(recent) < _STILL
         if behind > _STUCK and still:
             trace.stopped = True
             return False
-        if beside > _BESIDE or (short and float(np.linalg.norm(now - begun)) > _FIRST):
+        if beside > _BESIDE or (short and float(np.linalg.norm(place - begun)) > _FIRST):
             return False
     for _ in range(_PATIENCE):
         yield executor.command
@@ -151,5 +155,5 @@ def _reach(points: list[np.ndarray]) -> float:
     return float(np.linalg.norm(np.array(points) - points[0], axis=1).max())
 
 
-def _tcp(joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "3"]:
-    return forward(joints[None])[0][0, :3, 3]
+def _tcp(joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:
+    return forward(joints[None])[0][0]

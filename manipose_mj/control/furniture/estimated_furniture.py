@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.furniture_fit import as_drawer, fit_furniture
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of
+from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import found_opening
 from manipose_mj.control.furniture.part_sensing import PartSensor
@@ -35,10 +35,12 @@ _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 @dataclass(frozen=True)
 class _Held:
-    """Attributes: name; start: the TCP's place in the object frame with the part shut `(3,)` [m]."""
+    """Attributes: name; start: where the point of the hand that goes with the part is, in the object frame with the
+    part shut `(3,)` [m]; offset: of that point in the hand `(3,)` [m]."""
 
     name: str
     start: Float[np.ndarray, "3"]
+    offset: Float[np.ndarray, "3"]
 
 
 class EstimatedFurniture:
@@ -158,7 +160,8 @@ class EstimatedFurniture:
         self._held = None
         if part is not None and self.model is not None:
             back = invert(part.motion(part.opening)) @ invert(self.model.pose)
-            self._held = _Held(part.name, transform(back, tcp_pose[None, :3, 3])[0])
+            start = transform(back, tcp_pose[None, :3, 3])[0]
+            self._held = _Held(part.name, start, np.zeros(3))
 
     def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Find out how far parts are open now."""
@@ -168,7 +171,7 @@ class EstimatedFurniture:
         if self._held is not None:
             part = self._part(self._held.name)
             assert part is not None
-            now = transform(invert(model.pose), tcp_pose[None, :3, 3])[0]
+            now = points_of((invert(model.pose) @ tcp_pose)[None], self._held.offset)[0]
             opening = opening_of(part.part.joint, self._held.start, now)
             self.model = model.with_part(part.at(opening))
             return
@@ -183,22 +186,23 @@ class EstimatedFurniture:
             part.name for part in touched if self._near(part, tcp_pose)
         }  # looked at again until the hand is gone
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """Correct a joint by the way the hand went with the part; where it stopped, it goes no further.
 
         Args:
           name: Of the part.
-          path: Of the TCP that held its handle, world frame [m].
+          path: `T_world_tcp` of the hand that held its handle.
           stopped: Whether the part went no further.
         """
         model, part = self.model, self._part(name)
         if model is None or part is None or self._held is None:
             return
-        own = transform(invert(model.pose), path)
-        started = opening_of(part.part.joint, self._held.start, own[0])
-        joint = fitted_joint(part.part.joint, own).joint
-        gone = opening_of(joint, own[0], own[-1])
-        opening = started + gone
+        own = invert(model.pose) @ path
+        held = self._held
+        started = opening_of(part.part.joint, held.start, points_of(own[:1], held.offset)[0])
+        fitted = fitted_joint(part.part.joint, own)
+        joint, went = fitted.joint, points_of(own, fitted.offset)
+        opening = started + opening_of(joint, went[0], went[-1])
         low, high = joint.range
         # A hand that slips off before is none that came to the end.
         ends = stopped and opening > _END[joint.kind] * high
@@ -206,7 +210,7 @@ class EstimatedFurniture:
         moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
         # Where the hand would be were the part shut, by the joint as it is known now.
         back = invert(moved.motion(opening))
-        self._held = _Held(name, transform(back, own[-1][None])[0])
+        self._held = _Held(name, transform(back, went[-1:])[0], fitted.offset)
         self.model = model.with_part(moved)
 
     def pushed(self, name: str, opening: float) -> None:

@@ -15,9 +15,8 @@ from manipose_mj.assets.geometry import Joint
 from manipose_mj.poses import rotation_about
 
 _NOISE = 0.0015  # of the gripper on a bar, at most [m]
-_LEAST_NOISE = (
-    0.0003  # the same where it holds it well: it then keeps to a hinge's arc to some 0.1 mm [m]
-)
+_LEAST_NOISE = 0.0002  # the same where it holds it well [m]
+_OFFSET = 0.008  # standard deviation of the bar's place in the hand, about which the hand turns [m]
 _AXIS = np.radians(15.0)  # standard deviations of what clouds say: of an axis' direction,
 _PLACE = 0.06  # and of a hinge's place [m]
 _SHORT = 0.006  # ways that are shorter tell nothing [m]
@@ -27,25 +26,30 @@ _LEAST_RADIUS = 0.05  # of hinges, from the handle [m]
 
 @dataclass(frozen=True)
 class FittedJoint:
-    """Attributes: joint; misfit: root mean square distance of the points from its path [m]."""
+    """Attributes: joint; misfit: root mean square distance from its path [m]; offset: `(3,)`, of the point of the part
+    that went so, in the hand [m]."""
 
     joint: Joint
     misfit: float
+    offset: Float[np.ndarray, "3"]
 
 
-def fitted_joint(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
+def fitted_joint(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint:
     """The joint, corrected.
+
+    A hand need not turn with the bar that it holds: which of its points goes with the part is found too.
 
     Args:
       joint: As clouds have it; its axis points to where it opens.
-      path: Of one point of the part, in the joint's frame, as it opens; the first is where it began [m].
+      path: `T_joint_tcp` as the part opens; the first is where it began.
     """
-    gone = float(np.linalg.norm(path - path[0], axis=1).max())
+    points = path[:, :3, 3]
+    gone = float(np.linalg.norm(points - points[0], axis=1).max())
     if gone < _SHORT:
-        return FittedJoint(joint, 0.0)
+        return FittedJoint(joint, 0.0, np.zeros(3))
     if joint.kind == "hinge":
         return _fitted_hinge(joint, path)
-    straight = _fitted_slide(joint, path)
+    straight = _fitted_slide(joint, points)
     if straight.misfit < 2 * _NOISE or gone < 0.05:
         return straight
     turned = _hinge_of(straight.joint, path)
@@ -66,15 +70,16 @@ def _fitted_slide(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
     axis /= np.linalg.norm(axis)
     off = offset - (offset @ axis)[:, None] * axis
     misfit = float(np.sqrt((off**2).sum(axis=1).mean()))
-    return FittedJoint(replace(joint, axis=axis), misfit)
+    return FittedJoint(replace(joint, axis=axis), misfit, np.zeros(3))
 
 
-def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
+def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint:
     """Axis and place that the path circles, near those that clouds say."""
     first, second = _across(joint.axis)
     basis = np.stack([first, second], axis=1)
     # The point of the axis abreast of the handle.
-    foot = joint.origin + ((path[0] - joint.origin) @ joint.axis) * joint.axis
+    began = path[0, :3, 3]
+    foot = joint.origin + ((began - joint.origin) @ joint.axis) * joint.axis
 
     def changed(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         turn = basis @ by[:2]
@@ -82,30 +87,39 @@ def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
         axis = joint.axis
         if angle > 1e-9:
             axis = rotation_about(turn / angle, angle) @ axis
-        return axis, foot + basis @ by[2:]
+        return axis, foot + basis @ by[2:4]
 
-    def misfit(by: np.ndarray) -> float:
-        out, high = _off_circle(path, *changed(by))
-        return float(np.sqrt((out**2 + high**2).mean()))
+    def off(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _off_circle(points_of(path, by[4:]), *changed(by))
 
     def residuals(by: np.ndarray, noise: float) -> np.ndarray:
-        out, high = _off_circle(path, *changed(by))
-        return np.concatenate([out / noise, high / noise, by[:2] / _AXIS, by[2:] / _PLACE])
+        out, high = off(by)
+        prior = [by[:2] / _AXIS, by[2:4] / _PLACE, by[4:] / _OFFSET]
+        return np.concatenate([out / noise, high / noise, *prior])
 
     # A path is trusted as far as it is an arc.
-    found, noise = np.zeros(4), _LEAST_NOISE
+    found, noise = np.zeros(7), _LEAST_NOISE
     for _ in range(2):
         found = least_squares(residuals, found, args=(noise,), loss="soft_l1", max_nfev=60).x
-        noise = float(np.clip(misfit(found), _LEAST_NOISE, _NOISE))
+        misfit = float(np.sqrt(np.square(off(found)).sum(axis=0).mean()))
+        noise = float(np.clip(misfit, _LEAST_NOISE, _NOISE))
     axis, place = changed(found)
-    if np.linalg.norm(np.cross(path[0] - place, axis)) < _LEAST_RADIUS:
-        return FittedJoint(joint, float("inf"))
-    return FittedJoint(replace(joint, axis=axis, origin=place), misfit(found))
+    if np.linalg.norm(np.cross(began - place, axis)) < _LEAST_RADIUS:
+        return FittedJoint(joint, float("inf"), np.zeros(3))
+    return FittedJoint(replace(joint, axis=axis, origin=place), misfit, found[4:])
 
 
-def _hinge_of(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint | None:
+def points_of(
+    path: Float[np.ndarray, "n 4 4"], offset: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "n 3"]:
+    """Where a point of the hand at `offset` [m] from the TCP is."""
+    return path[:, :3, 3] + path[:, :3, :3] @ offset
+
+
+def _hinge_of(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint | None:
     """A hinge that the path of what was taken for a drawer circles."""
-    offset = path - path[0]
+    points = path[:, :3, 3]
+    offset = points - points[0]
     _, _, directions = np.linalg.svd(offset - offset.mean(axis=0))
     normal = directions[2]
     u, v = directions[0], directions[1]
@@ -113,8 +127,8 @@ def _hinge_of(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint | Non
     # x^2 + y^2 = 2 a x + 2 b y + c
     rows = np.column_stack([2 * flat, np.ones(len(flat))])
     solution, *_ = np.linalg.lstsq(rows, (flat**2).sum(axis=1), rcond=None)
-    center = path[0] + solution[0] * u + solution[1] * v
-    out = path[0] - center
+    center = points[0] + solution[0] * u + solution[1] * v
+    out = points[0] - center
     axis = normal * np.sign(np.cross(normal, out) @ joint.axis)
     if not axis.any() or not _LEAST_RADIUS < np.linalg.norm(out) < 1.2:
         return None

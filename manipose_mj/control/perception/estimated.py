@@ -233,8 +233,8 @@ class EstimatedPerception:
             self._held = (name, invert(tcp) @ self._known[name].pose)
             self._held_width = self.robot()[1]
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
-        """The hand led a part along this path, world frame [m]; `stopped`: it went no further."""
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
+        """The hand led a part along this path, by `T_world_tcp`; `stopped`: it went no further."""
         self._world.feel(name, path, stopped)
 
     def pushed(self, name: str, opening: float) -> None:

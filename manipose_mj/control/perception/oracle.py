@@ -58,7 +58,7 @@ class OraclePerception:
     def hold(self, name: str | None) -> None:
         """Nothing to remember: what is held is seen."""
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """Nothing to learn."""
 
     def pushed(self, name: str, opening: float) -> None:

@@ -72,7 +72,7 @@ class PerturbedPerception:
         """The arm in the scene of the last observation."""
         return self._perception.arm
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """The hand led a part along this path, world frame [m]; `stopped`: it went no further."""
         self._perception.feel(name, path, stopped)
 

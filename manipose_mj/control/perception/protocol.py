@@ -48,12 +48,12 @@ class Perception(Protocol):
         """The hand holds this from now on; None: it has let go."""
         ...
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
-        """The hand led a part by its handle along this path of the TCP, world frame [m].
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
+        """The hand led a part by its handle.
 
         Args:
           name: Of the part.
-          path: Of the TCP.
+          path: `T_world_tcp` on the way.
           stopped: Whether the part went no further.
         """
         ...

@@ -146,7 +146,7 @@ class SensedWorld:
         """Remember how the hand holds a handle."""
         self._furniture.hold(name, tcp_pose)
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """Correct a joint."""
         self._furniture.feel(name, path, stopped)
 

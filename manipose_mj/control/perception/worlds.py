@@ -70,7 +70,7 @@ class World(Protocol):
         """The hand at `T_world_tcp` holds a part's handle from now on, or something else."""
         ...
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """The hand led a part along a path, world frame [m]; `stopped`: it went no further."""
         ...
 
@@ -135,7 +135,7 @@ class SimulatedWorld:
     def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Nothing to remember."""
 
-    def feel(self, name: str, path: Float[np.ndarray, "n 3"], stopped: bool) -> None:
+    def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """Nothing to learn."""
 
     def pushed(self, name: str, opening: float) -> None:
