@@ -257,7 +257,8 @@ class Primitives:
         for _ in range(_STAGES if self.in_stages else _PUSHES):
             if abs(part.opening - opening) < _PUSH_TOLERANCE * span:
                 return
-            if self.in_stages and self._led_beyond(part, opening):
+            led = self.in_stages or self._executor.feels_joints
+            if led and self._led_beyond(part, opening):
                 return
             yield from self._push_once(planner, name, opening)
             part = self._executor.observe().parts[name]
