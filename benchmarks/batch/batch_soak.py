@@ -3,8 +3,9 @@
 python benchmarks/batch/batch_soak.py TASK [--minutes 20] [--worlds 8192] [--engine warp] [--objects NAME ...]
 
 Each minute: environment steps a second, memory of the device and of this process, values that are not finite in worlds that
-are not flagged `physics`, worlds flagged so, worlds whose contacts had too little room, episodes that ended. The last line
-is a verdict: the first minute, which may compile, does not count.
+are not flagged `physics`, worlds flagged so, steps of worlds that are flagged `overflowed` (a flag lasts until its episode
+ends), episodes that ended. If there were such steps, a line tells which limits of MuJoCo Warp were met. The last line is a
+verdict: the first minute, which may compile, does not count.
 """
 
 from __future__ import annotations
@@ -20,13 +21,16 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jaxtyping import Int
 
 from manipose_mj import batch
+from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.poses import Array
 
 STEPS = 50  # control steps between looks at the clock
 HELD = 25  # control steps for which a random action is held
+LIMITS = 12  # of MuJoCo Warp that it flags: contacts, rows, iterations and others
 SLOWER, GROWTH = 0.05, 64e6  # of the rate, and of memory [bytes], that are no change
 COLUMNS = (
     "minute", "environment steps/s", "device [GB]", "process [GB]", "not finite", "physics", "overflowed",
@@ -57,6 +61,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=32, help="drawn before")
     parser.add_argument("--row", type=float, default=60.0, help="seconds of a row")
     arguments = parser.parse_args()
+    compile_at_once_on_gpus()
     worlds = batch.make(
         arguments.task,
         worlds=arguments.worlds,
@@ -80,17 +85,20 @@ def soak(worlds: batch.Worlds, seconds: float, row: float) -> list[Minute]:
     """Step and print; `row`: seconds of each row."""
     chunk = jax.jit(lambda state, key: _chunk(worlds, state, key))
     state, key, rows = worlds.reset(jax.random.key(0)), jax.random.key(1), []
-    ends = time.perf_counter() + seconds
+    ends, met = time.perf_counter() + seconds, np.zeros(LIMITS, int)
     while time.perf_counter() < ends:
         began, steps, counts = time.perf_counter(), 0, np.zeros(4, int)
         while time.perf_counter() - began < row:
             key, own = jax.random.split(key)
             state, found = chunk(state, own)
             counts += np.asarray(found)
+            met = np.maximum(met, limits_met(state))
             steps += STEPS * worlds.count
         rate = steps / (time.perf_counter() - began)
         rows.append(Minute(rate, device_memory(worlds), process_memory(), *counts.tolist()))
         print(_line(len(rows), rows[-1]), flush=True)
+    if met.any():
+        print(f"limits met, by the most worlds at once: {named_limits(met)}")
     return rows
 
 
@@ -109,6 +117,21 @@ def verdict(rows: Sequence[Minute]) -> list[str]:
         if growth > GROWTH:
             found.append(f"memory of the {name} grew by {growth / 1e6:.0f} MB")
     return found
+
+
+def limits_met(state: batch.State) -> Int[np.ndarray, "limits"]:
+    """How many worlds have met each limit of the engine `warp` in their episodes, in the order of its bits."""
+    if not isinstance(state.simulation, dict):
+        return np.zeros(LIMITS, int)
+    bits = np.asarray(state.simulation["overflow"])
+    return (bits[:, None] >> np.arange(LIMITS) & 1).sum(axis=0)
+
+
+def named_limits(met: Int[np.ndarray, "limits"]) -> str:
+    """As MuJoCo Warp names them, with the counts."""
+    from mujoco_warp import OverflowType  # pyright: ignore[reportMissingImports]
+
+    return ", ".join(f"{OverflowType(1 << i).name} {met[i]}" for i in np.flatnonzero(met))
 
 
 def device_memory(worlds: batch.Worlds) -> float:

@@ -5,13 +5,17 @@ python benchmarks/batch/playground_comparison.py [--worlds 8192 32768] [--object
 Needs an NVIDIA GPU and `pip install playground==0.2.0`. Both make ten physics steps of 2 ms in a control step, and random
 actions, each held for 25. Playground in its default configuration has room for the contacts of 2,048 worlds; its best is the
 fastest graph mode with room for all. Its `step` is timed bare, without a wrapper that ends and begins episodes; ours begins
-them anew. Its solver makes at most 5 iterations. Medians of the turns.
+them anew. Its solver makes at most 5 iterations, and of its robot only the fingers and the hand's capsule collide. So a row
+more steps our scene as MJX does, bare, along the set-points of ours. Medians of the turns. Playground's and MJX's kernels are
+compiled one after another: a minute or two each from an empty cache; each first turn is told as it ends.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import statistics
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,6 +28,8 @@ import mujoco
 import numpy as np
 
 from manipose_mj import batch
+from manipose_mj.batch.row_fields import RowFields
+from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 
@@ -33,7 +39,8 @@ HELD = 25
 SPREAD = 0.6  # of our joint targets about home [rad]
 PHYSICS_STEP, SUBSTEPS = 0.002, 10
 CONTACTS, ROWS = 24, 128  # Playground's own room for a world
-MODES = ("WARP", "WARP_STAGED", "WARP_STAGED_EX")
+PLAYGROUND = "Playground"
+MODES = ("JAX", "WARP", "WARP_STAGED", "WARP_STAGED_EX")
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,7 @@ def main() -> None:
     parser.add_argument("--objects", nargs="+", default=["box_000"])
     parser.add_argument("--steps", type=int, default=50, help="control steps in a turn")
     arguments = parser.parse_args()
+    compile_at_once_on_gpus()
     versions = (
         f"MuJoCo {mujoco.__version__}, JAX {jax.__version__}, Playground {version('playground')}"
     )
@@ -68,6 +76,7 @@ def compare(count: int, arguments: argparse.Namespace) -> None:
     makers: list[Callable[[], Runner]] = [lambda: ours(count, arguments.objects, arguments.steps)]
     for mode in (None, *MODES):
         makers.append(lambda mode=mode: playground(count, mode, arguments.steps))
+    makers.append(lambda: mjx_of_ours(count, arguments.objects, arguments.steps))
     runners, first = [], {}
     for make in makers:
         began = time.perf_counter()
@@ -81,6 +90,7 @@ def compare(count: int, arguments: argparse.Namespace) -> None:
             continue
         runners.append(runner)
         first[runner.name] = time.perf_counter() - began
+        print(f"{runner.name}: first turn after {first[runner.name]:.0f} s", file=sys.stderr)
     rates = in_turns(runners)
     own = rates[runners[0].name]
     for runner in runners:
@@ -88,7 +98,7 @@ def compare(count: int, arguments: argparse.Namespace) -> None:
         print(
             f"| {count:,} | {runner.name} | {rate:,.0f} | {rate / own:.2f} | {first[runner.name]:.0f} |"
         )
-    others = [rates[runner.name] for runner in runners[1:]]
+    others = [rates[runner.name] for runner in runners if runner.name.startswith(PLAYGROUND)]
     if others:
         print(f"{count:,} worlds: {own / max(others):.2f} times the best of Playground", flush=True)
     for runner in runners:
@@ -108,6 +118,16 @@ def in_turns(runners: Sequence[Runner]) -> dict[str, float]:
 
 def ours(count: int, objects: Sequence[str], steps: int, engine: Any = "warp") -> Runner:
     """Batched worlds with observations, reward, success and auto-reset."""
+    worlds, actions = worlds_and_actions(count, objects, steps, engine)
+    roll = jax.jit(lambda state: worlds.rollout(actions, state))
+    state = worlds.reset(jax.random.key(0))
+    return Runner("ours", lambda: roll(state), count * steps, worlds.close)
+
+
+def worlds_and_actions(
+    count: int, objects: Sequence[str], steps: int, engine: Any
+) -> tuple[batch.Worlds, Any]:
+    """Ours, and random joint targets."""
     worlds = batch.make(
         TASK,
         worlds=count,
@@ -122,10 +142,65 @@ def ours(count: int, objects: Sequence[str], steps: int, engine: Any = "warp") -
     noise = jax.random.uniform(jax.random.key(1), (held, count, 8), minval=-1.0)
     center = np.append(HOME, MAX_OPENING / 2)
     targets = center + noise * np.append(np.full(7, SPREAD), MAX_OPENING / 2)
-    actions = jnp.repeat(targets, HELD, axis=0)[:steps]
-    roll = jax.jit(lambda state: worlds.rollout(actions, state))
-    state = worlds.reset(jax.random.key(0))
-    return Runner("ours", lambda: roll(state), count * steps, worlds.close)
+    return worlds, jnp.repeat(targets, HELD, axis=0)[:steps]
+
+
+def mjx_of_ours(count: int, objects: Sequence[str], steps: int) -> Runner:
+    """The physics of our scene alone, stepped by MJX: its first start's model in every world."""
+    worlds, actions = worlds_and_actions(count, objects, steps, "warp")
+
+    def one(state: Any, action: Any) -> tuple[Any, Any]:
+        after = worlds.step(state, action)
+        return after, after.simulation["ctrl"]
+
+    begun = worlds.reset(jax.random.key(0))
+    set_points = jax.jit(lambda state: jax.lax.scan(one, state, actions)[1])(begun)
+    set_points = jax.block_until_ready(set_points)
+    model, room = RowFields(worlds.pool).model, worlds.engine.capacity  # pyright: ignore[reportAttributeAccessIssue]
+    worlds.close()
+    return bare_mjx(model, room, begun.simulation, set_points)
+
+
+def bare_mjx(
+    model: mujoco.MjModel, room: batch.Capacity, begun: Any, set_points: Any, mode: str = "WARP"
+) -> Runner:
+    """MJX's steps along given set-points.
+
+    Args:
+      model: Of every world.
+      room: For contacts and rows.
+      begun: `qpos`, `qvel` and `ctrl` to begin with, with an axis of worlds.
+      set_points: Of each control step and world.
+      mode: Of graphs.
+    """
+    import warp as wp  # pyright: ignore[reportMissingImports]
+    from mujoco import mjx
+
+    graphs = getattr(wp.JaxCallableGraphMode, mode)
+    on_device = mjx.put_model(model, impl="warp", graph_mode=graphs)
+    steps, count = set_points.shape[:2]
+    contacts = math.ceil(room.contacts * count)
+
+    def begin(qpos: Any, qvel: Any, ctrl: Any) -> Any:
+        data = mjx.make_data(
+            model, impl="warp", naconmax=contacts, naccdmax=contacts, njmax=room.constraints
+        )
+        return data.replace(qpos=qpos, qvel=qvel, ctrl=ctrl)
+
+    def control_step(data: Any, ctrl: Any) -> Any:
+        data = data.replace(ctrl=ctrl)
+        step = jax.lax.scan(
+            lambda data, _: (mjx.step(on_device, data), None), data, length=SUBSTEPS
+        )
+        return step[0]
+
+    def one(data: Any, ctrl: Any) -> tuple[Any, None]:
+        return jax.vmap(control_step)(data, ctrl), None
+
+    roll = jax.jit(lambda data: jax.lax.scan(one, data, set_points)[0].qpos)
+    data = jax.jit(jax.vmap(begin))(begun["qpos"], begun["qvel"], begun["ctrl"])
+    name = f"MJX on our scene, bare, {mode}"
+    return Runner(name, lambda: roll(data), count * steps, jax.clear_caches)
 
 
 def playground(count: int, mode: str | None, steps: int) -> Runner:
@@ -162,7 +237,7 @@ def playground(count: int, mode: str | None, steps: int) -> Runner:
         return jax.lax.scan(one, state, actions)
 
     state = jax.jit(jax.vmap(environment.reset))(jax.random.split(jax.random.key(0), count))
-    name = f"Playground, {'default' if mode is None else f'room for all, {mode}'}"
+    name = f"{PLAYGROUND}, {'default' if mode is None else f'room for all, {mode}'}"
     return Runner(name, lambda: roll(state), count * steps, jax.clear_caches)
 
 

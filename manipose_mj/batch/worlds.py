@@ -38,8 +38,8 @@ class State(NamedTuple):
       truncated: Whether it ended at the horizon.
       success: Whether the goals were met after the last step.
       success_once: Whether they were after any step of the episode.
-      overflowed: Whether the engine had too little room for the contacts of the episode at any step: its physics
-        does not count.
+      overflowed: Whether the engine met a limit at any step of the episode, such as its room for contacts: its
+        physics does not count.
       row: Of each world's start in the pool.
       count: Control steps of the present episode.
       succeeded: Whether its goals were met after any of them.

@@ -6,6 +6,7 @@ import importlib
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from tests.batch.batched import make
@@ -46,3 +47,13 @@ def test_a_few_seconds_run_and_a_value_without_a_flag_is_counted(soak, capsys):
     assert int(soak.broken_values(hurt)) == 2
     flagged = hurt._replace(terminated=jnp.array([True, False]))
     assert int(soak.broken_values(flagged)) == 1
+
+
+def test_limits_are_counted_bit_by_bit_and_named(soak):
+    worlds = make("articulated/open_middle_drawer", 2, reward_mode="dense", obs_mode="state")
+    state = worlds.reset(jax.random.key(0))
+    assert not soak.limits_met(state).any()
+    met = soak.limits_met(state._replace(simulation={"overflow": jnp.array([1 | 1 << 9, 1 << 9])}))
+    assert met[0] == 1 and met[9] == 2 and met.sum() == 3
+    pytest.importorskip("mujoco_warp")
+    assert soak.named_limits(np.array(met)) == "NEFC 1, ITERATIONS 2"

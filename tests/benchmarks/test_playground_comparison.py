@@ -36,3 +36,24 @@ def test_what_playground_lacks_is_left_out_in_a_line(comparison, monkeypatch, ca
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "left out: ModuleNotFoundError: No module named 'mujoco_playground'"
     assert out[-1].startswith("| 2 | ours | ") and "| 1.00 |" in out[-1]
+
+
+def test_ours_is_compared_with_playground_and_not_with_mjx_on_our_scene(
+    comparison, monkeypatch, capsys
+):
+    def fake(name):
+        return lambda *_: comparison.Runner(name, lambda: None, 10, lambda: None)
+
+    monkeypatch.setattr(comparison, "ours", fake("ours"))
+    monkeypatch.setattr(
+        comparison, "playground", lambda _, mode, *__: fake(f"Playground, {mode}")()
+    )
+    monkeypatch.setattr(comparison, "mjx_of_ours", fake("MJX on our scene"))
+    rates = {"ours": 3.0, "Playground, WARP": 2.0, "MJX on our scene": 9.0}
+    monkeypatch.setattr(
+        comparison, "in_turns", lambda all_: {one.name: rates.get(one.name, 1.0) for one in all_}
+    )
+    comparison.compare(2, argparse.Namespace(objects=["box_000"], steps=2))
+    out = capsys.readouterr()
+    assert out.out.splitlines()[-1] == "2 worlds: 1.50 times the best of Playground"
+    assert "MJX on our scene: first turn after" in out.err
