@@ -320,3 +320,11 @@ def test_reports_say_which_poses_were_estimated(cup, pose, tmp_path):
     config = EvaluationConfig((TARGET_POSE,), tmp_path, pose=pose)
     assert dict(Baseline(cup, pose).perception.sources) == config.poses
     assert config.poses["objects"] == {"oracle": "true", "estimated": "estimated"}[pose]
+
+
+def test_shelves_are_of_the_surroundings():
+    environment = suite.load("single_object", "target_pose_shelf", seed=0, obs_mode="state")
+    environment.reset()
+    task = environment.task
+    names = [task.instance_names[mask] for mask in task.surroundings_masks]
+    assert names == ["background", "shelf"]
