@@ -18,6 +18,7 @@ from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import found_opening
 from manipose_mj.control.furniture.part_sensing import PartSensor
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
+from manipose_mj.control.furniture.pulled_out import pulled_out
 from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.errors import InputError
@@ -101,7 +102,17 @@ class EstimatedFurniture:
                     break
             else:
                 found.reverse()
-            self.model = found[-1]
+            self.model = self._with_drawers_out(found[-1], cloud, asked)
+
+    def _with_drawers_out(
+        self, model: FurnitureModel, cloud: SceneCloud, asked: Mapping[str, str]
+    ) -> FurnitureModel:
+        """With drawers that should stand open, and look shut, where a front stands out of the body."""
+        openings = {part.name: part.opening for part in model.parts}
+        for name in sorted(self._expected_open):
+            if openings[name] == 0.0 and "drawer" in asked.get(name, "").split():
+                model = pulled_out(model, cloud, name) or model
+        return model
 
     @property
     def _expected_open(self) -> frozenset[str]:

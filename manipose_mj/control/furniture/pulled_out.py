@@ -1,0 +1,88 @@
+"""A drawer that stands open and whose handle was not found: its front stands out of the body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.furniture_fit import as_drawer
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import compose, invert, transform
+
+_FACING = 0.75  # cosine between normals of a drawer's front and X, at least
+# How far such a front stands out of the body: handles stand out less, nothing slides further [m].
+_LEAST_OUT, _MOST_OUT = 0.06, 0.60
+_PLANE = 0.012  # how far points of a front are from its plane [m]
+_BIN = 0.004  # in which they are counted [m]
+_LEAST, _SMALLEST = 200, 0.05  # points of a front; its sides [m]
+_THICKNESS = 0.018  # [m]
+_HANDLE = 0.03  # of a handle before its front [m]
+_ACROSS = np.array(
+    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+)  # a bar along Y, X outwards
+_LOOKS = 500
+
+
+def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> FurnitureModel | None:
+    """The model with a drawer of that name where a front stands out of the body; None where none does.
+
+    What had the name is kept under another.
+
+    Args:
+      model: With its parts, which all look shut.
+      cloud: Of the furniture, with normals.
+      name: Of the drawer.
+    """
+    points = transform(invert(model.pose), cloud.points)
+    out = cloud.normals @ model.pose[:3, 0] > _FACING
+    front = _body_front(model)
+    low, high = model.solid[:, 0].min(axis=0) - 0.03, model.solid[:, 1].max(axis=0) + 0.03
+    out &= (points[:, 0] > front + _LEAST_OUT) & (points[:, 0] < front + _MOST_OUT)
+    out &= ((points > low) & (points < high))[:, 1:].all(axis=1)
+    if out.sum() < _LEAST:
+        return None
+    edges = np.arange(front + _LEAST_OUT, front + _MOST_OUT + 2 * _BIN, _BIN)
+    counts = np.convolve(np.histogram(points[out, 0], edges)[0], np.ones(3), mode="same")
+    place = edges[int(counts.argmax())] + _BIN / 2
+    on = out & (np.abs(points[:, 0] - place) < _PLANE)
+    ends = np.percentile(points[on, 1:], [1, 99], axis=0)
+    if on.sum() < _LEAST or (np.ptp(ends, axis=0) < _SMALLEST).any():
+        return None
+    opening = float(np.median(points[on, 0])) - front
+    shut = points - [opening, 0.0, 0.0]
+    panel = np.column_stack([[front - _THICKNESS, front], ends])
+    middle = np.array([front + _HANDLE, *ends.mean(axis=0)])
+    handle, _ = handle_label(shut, compose(_ACROSS, middle), front)
+    rows = np.random.default_rng(0).permutation(np.flatnonzero(on))[:_LOOKS]
+    joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, 1.0))
+    part = PartModel(
+        part=MovingPart(name, joint, handle, None),
+        panel=panel,
+        handle=handle_boxes(handle, front),
+        opening=0.0,
+        confidence=1.0,
+        looks=shut[rows],
+    )
+    drawer = as_drawer(part)
+    joint = drawer.part.joint
+    joint = replace(joint, range=(0.0, max(joint.range[1], opening)))
+    drawer = replace(drawer, part=replace(drawer.part, joint=joint), opening=opening)
+    others = [
+        replace(each, part=replace(each.part, name=f"part_{len(model.parts)}"))
+        if each.name == name
+        else each
+        for each in model.parts
+    ]
+    return replace(model, parts=(*others, drawer))
+
+
+def _body_front(model: FurnitureModel) -> float:
+    """Where the fronts of shut parts are, along X [m]."""
+    fronts: Float[np.ndarray, "k"] = np.array([part.panel[1, 0] for part in model.parts])
+    return float(np.median(fronts)) if len(fronts) else float(model.solid[:, 1, 0].max())
