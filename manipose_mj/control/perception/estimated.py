@@ -67,9 +67,9 @@ _AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
 _BETTER = 0.9  # of the misfit that is left, for another pose to replace it
 # How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
-# they lose it [m].
+# they lose it: [m], and as a share of its width.
 _IN_HAND = (0.03, 0.5)
-_LOST = 0.004
+_LOST, _LOST_SHARE = 0.004, 0.5
 
 
 @dataclass(frozen=True)
@@ -124,6 +124,7 @@ class EstimatedPerception:
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
         self._held_width = 0.0  # of the gripper then [m]
+        self._dropped: set[str] = set()  # objects that lie otherwise than their grasps were made for
         self._time = -1.0
         self._keys = _keys(0)
         self.sources: Mapping[str, str] = {
@@ -141,7 +142,7 @@ class EstimatedPerception:
           InputError: There are no weights for a category or its type.
         """
         self._keys = _keys(seed)
-        self._held, self._known, self._grasps = None, {}, {}
+        self._held, self._known, self._grasps, self._dropped = None, {}, {}, set()
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
@@ -212,6 +213,9 @@ class EstimatedPerception:
             self._world.follow(tcp)
             for name in self._known:
                 self._known[name] = self._updated(name, tcp)
+            for name in self._dropped - {None if self._held is None else self._held[0]}:
+                self._grasps[name] = self._grasps_of(name)
+                self._dropped.remove(name)
             self._time = time
         scene = self._planning_scene()
         objects = {
@@ -271,11 +275,13 @@ class EstimatedPerception:
             return before
         if self._held is not None and held:
             self._held = (name, invert(tcp) @ sensed.pose)
+            if not _nearly(sensed, before):
+                self._dropped.add(name)
         return sensed
 
     def _may_be_lost(self) -> bool:
         """Whether the fingers have closed on what they held: friction lets nothing jump that they are still around."""
-        return self.robot()[1] < self._held_width - _LOST
+        return self.robot()[1] < self._held_width - min(_LOST, _LOST_SHARE * self._held_width)
 
     def _sensed(
         self, name: str, views: tuple[ObjectView, ...], shapes: ShapeFitter
