@@ -124,7 +124,9 @@ class EstimatedPerception:
         self._grasps: dict[str, GraspSet] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
         self._held_width = 0.0  # of the gripper then [m]
-        self._dropped: set[str] = set()  # objects that lie otherwise than their grasps were made for
+        self._dropped: set[str] = (
+            set()
+        )  # objects that lie otherwise than their grasps were made for
         self._time = -1.0
         self._keys = _keys(0)
         self.sources: Mapping[str, str] = {

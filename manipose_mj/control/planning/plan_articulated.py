@@ -293,7 +293,7 @@ def poses_in_cavity(
     boxes = [(rotation @ obj.label.center, obj.label.reach(rotation)) for rotation in rotations]
     if estimate is not None and not any((reach <= room).all() for _, reach in boxes):
         # A box around a box that is tilted is larger than one around what tapers.
-        boxes = [_tight_box(obj, estimate, rotation) for rotation in rotations]
+        boxes = [obj.box_around(estimate.scene, rotation) for rotation in rotations]
     for rotation, (middle, reach) in zip(rotations, boxes, strict=True):
         slack = room - reach
         if (slack < 0).any():
@@ -322,15 +322,6 @@ def poses_in_cavity(
             found.append((other_side, clear, round(reach[2], 4), off, back, pose))
     found.sort(key=lambda entry: entry[:5])
     return tuple(entry[5] for entry in found)
-
-
-def _tight_box(
-    obj: ObjectEstimate, estimate: SceneEstimate, rotation: Float[np.ndarray, "3 3"]
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Middle, from the label's origin, and half the lengths of the box around an object whose label is turned so."""
-    corners = obj.corners(estimate.scene) @ rotation.T
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return (low + high) / 2, (high - low) / 2
 
 
 def _hand_towards(

@@ -71,10 +71,24 @@ class ObjectEstimate:
         return AttachedObject(self.body, self.geoms, pose_tcp, opening, self.uncertainty)
 
     def corners(self, scene: PlanningScene) -> Float[np.ndarray, "v 3"]:
-        """Points whose convex hull is the object's, label frame [m]."""
-        geoms = np.flatnonzero(self.geoms)
-        corners = [geom_corners(scene.model, int(geom)) for geom in geoms]
-        return transform(invert(self.label.pose), np.concatenate(corners))
+        """Points whose convex hull is the object's, label frame [m]; none where the scene does not have it."""
+        corners = [geom_corners(scene.model, int(geom)) for geom in np.flatnonzero(self.geoms)]
+        return transform(invert(self.label.pose), np.concatenate([np.zeros((0, 3)), *corners]))
+
+    def box_around(
+        self, scene: PlanningScene, rotation: Float[np.ndarray, "3 3"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """The box around its shape, along the axes of a frame in which its label is turned so.
+
+        Returns:
+          Its middle from the label's origin `(3,)`, and half its lengths `(3,)` [m]; of the label's box where the scene does
+          not have the object.
+        """
+        turned = self.corners(scene) @ rotation.T
+        if not len(turned):
+            return rotation @ self.label.center, self.label.reach(rotation)
+        low, high = turned.min(axis=0), turned.max(axis=0)
+        return (low + high) / 2, (high - low) / 2
 
     def placed_at(self, label_pose: Float[np.ndarray, "4 4"]) -> FixedObject:
         """The object with its label at `T_world_label`."""
