@@ -32,6 +32,7 @@ _PATIENCE = 12  # control steps
 _SLIPS, _SLIPPED, _SLIPPED_SHARE = 0.002, 0.003, 0.4
 _MOST = 14  # corrections
 _FURTHER = {"slide": 1.35, "hinge": 1.15}  # of what is asked for: how far a part opens is a guess
+_BEYOND_SHUT = {"slide": 0.008, "hinge": 0.08}  # how far a part is led that shall be shut [m, rad]
 _ENOUGH = {
     "slide": 0.35,
     "hinge": 0.25,
@@ -107,7 +108,7 @@ def _way(
     """As far beyond the opening as a part may go, or as the arm can."""
     beyond = started + _FURTHER[part.joint.kind] * (opening - started)
     if opening <= part.joint.range[0]:
-        beyond = opening
+        beyond = opening - _BEYOND_SHUT[part.joint.kind]
     if abs(beyond - part.opening) < 0.01:
         return None
     way = way_in_hand(planner, estimate, part, beyond, _HELD)

@@ -10,6 +10,7 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import Bool, Float
 
+from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.furniture_fit import as_drawer, fit_furniture
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
@@ -31,6 +32,7 @@ from manipose_mj.tasks.instructions.sentence import asked_parts
 _LEAST_POINTS = 1500  # of furniture that is looked at
 _SURE_PART = 0.15  # confidence of parts that nobody asked for
 _END = {"slide": 0.5, "hinge": 0.8}  # of the usual range, from which on a stop is its end
+_LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 
@@ -70,9 +72,10 @@ class EstimatedFurniture:
         self._mask = 0
         self._held: _Held | None = None
         self._moved: set[str] = set()
+        self._felt: dict[str, Joint] = {}  # hinges that a long arc of the hand has corrected
         self._before: dict[
             str, float
-        ] = {}  # openings of parts that were pushed and not looked at since
+        ] = {}  # openings of parts that were pushed, or that the hand slipped off, and not looked at since
 
     def reset(self, key: Any) -> None:
         """Look at the furniture of the episode.
@@ -80,7 +83,8 @@ class EstimatedFurniture:
         Raises:
           StageFailure: No part is found that a goal could mean.
         """
-        self.model, self._held, self._moved, self._before = None, None, set(), {}
+        self.model, self._held, self._moved = None, None, set()
+        self._before, self._felt = {}, {}
         for category, mask in self._task.furniture_masks:
             self._mask = mask
             seen = self._cloud(self._front_cameras)
@@ -211,10 +215,16 @@ class EstimatedFurniture:
         own = invert(model.pose) @ path
         held = self._held
         started = opening_of(part.part.joint, held.start, points_of(own[:1], held.offset)[0])
-        fitted = fitted_joint(part.part.joint, own)
+        known = self._felt.get(name)
+        fitted = fitted_joint(known or part.part.joint, own, sure=known is not None)
         joint, went = fitted.joint, points_of(own, fitted.offset)
-        opening = started + opening_of(joint, went[0], went[-1])
-        low, high = joint.range
+        gone = opening_of(joint, went[0], went[-1])
+        opening = started + gone
+        if joint.kind == "hinge" and abs(gone) > _LONG_ARC and not stopped:
+            self._felt[name] = joint
+        if stopped:
+            self._before[name] = started  # a hand that slips goes on without the part
+        low, high = part.part.joint.range
         # A hand that slips off before is none that came to the end.
         ends = stopped and opening > _END[joint.kind] * high
         joint = replace(joint, range=(low, opening if ends else max(high, opening)))

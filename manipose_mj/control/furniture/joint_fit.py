@@ -19,6 +19,7 @@ _LEAST_NOISE = 0.0002  # the same where it holds it well [m]
 _OFFSET = 0.008  # standard deviation of the bar's place in the hand, about which the hand turns [m]
 _AXIS = np.radians(15.0)  # standard deviations of what clouds say: of an axis' direction,
 _PLACE = 0.06  # and of a hinge's place [m]
+_SURE_AXIS, _SURE_PLACE = np.radians(3.0), 0.008  # the same of what a long arc has said before
 _SHORT = 0.006  # ways that are shorter tell nothing [m]
 _CURVED = 3.0  # how many times better a hinge must fit for a drawer to be a door
 _LEAST_RADIUS = 0.05  # of hinges, from the handle [m]
@@ -34,7 +35,9 @@ class FittedJoint:
     offset: Float[np.ndarray, "3"]
 
 
-def fitted_joint(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint:
+def fitted_joint(
+    joint: Joint, path: Float[np.ndarray, "n 4 4"], *, sure: bool = False
+) -> FittedJoint:
     """The joint, corrected.
 
     A hand need not turn with the bar that it holds: which of its points goes with the part is found too.
@@ -42,13 +45,14 @@ def fitted_joint(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint:
     Args:
       joint: As clouds have it; its axis points to where it opens.
       path: `T_joint_tcp` as the part opens; the first is where it began.
+      sure: Whether a long arc has corrected it before: a hand that slips off does not change it much.
     """
     points = path[:, :3, 3]
     gone = float(np.linalg.norm(points - points[0], axis=1).max())
     if gone < _SHORT:
         return FittedJoint(joint, 0.0, np.zeros(3))
     if joint.kind == "hinge":
-        return _fitted_hinge(joint, path)
+        return _fitted_hinge(joint, path, sure)
     straight = _fitted_slide(joint, points)
     if straight.misfit < 2 * _NOISE or gone < 0.05:
         return straight
@@ -73,8 +77,11 @@ def _fitted_slide(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
     return FittedJoint(replace(joint, axis=axis), misfit, np.zeros(3))
 
 
-def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint:
-    """Axis and place that the path circles, near those that clouds say."""
+def _fitted_hinge(
+    joint: Joint, path: Float[np.ndarray, "n 4 4"], sure: bool = False
+) -> FittedJoint:
+    """Axis and place that the path circles, near those that are known."""
+    turns, places = (_SURE_AXIS, _SURE_PLACE) if sure else (_AXIS, _PLACE)
     first, second = _across(joint.axis)
     basis = np.stack([first, second], axis=1)
     # The point of the axis abreast of the handle.
@@ -94,7 +101,7 @@ def _fitted_hinge(joint: Joint, path: Float[np.ndarray, "n 4 4"]) -> FittedJoint
 
     def residuals(by: np.ndarray, noise: float) -> np.ndarray:
         out, high = off(by)
-        prior = [by[:2] / _AXIS, by[2:4] / _PLACE, by[4:] / _OFFSET]
+        prior = [by[:2] / turns, by[2:4] / places, by[4:] / _OFFSET]
         return np.concatenate([out / noise, high / noise, *prior])
 
     # A path is trusted as far as it is an arc.

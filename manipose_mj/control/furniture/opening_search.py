@@ -17,12 +17,21 @@ _BEYOND = {"slide": 0.04, "hinge": 0.25}  # openings beyond the usual that are l
 _WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
-_THICKNESS = 0.018  # of a panel, whose other side may be all that shows [m]
+_THICKNESSES = (
+    0.010,
+    0.014,
+    0.018,
+    0.025,
+)  # of a panel, whose other side may be all that shows [m]
 _SEEN = 0.75  # share of the points that has to be seen at best: some are hidden
 _HIDDEN = (
     0.5  # a point that nobody can see counts as so far, as a share of what is far: it tells nothing
 )
 _MOST = 300
+# Openings of doors below this are measured by how far points are before the front [rad]; how far from a panel's edges, and
+# before the front, they are looked for [m]; from which share of the longest lever on; how many there have to be, and which
+# share of what is seen there.
+_NEARLY_SHUT, _MARGIN, _FAR_FROM_HINGE, _TELLING, _MOST_SEEN = 0.2, 0.02, 0.5, 100, 0.5
 
 
 Hidden = Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]
@@ -52,19 +61,20 @@ def found_opening(
     kind = part.part.joint.kind
     tree = cKDTree(points)
     # A door that stands wide open turns its other side to the cameras; a drawer never does.
-    sides = [looks] if kind == "slide" else [looks, looks - [_THICKNESS, 0.0, 0.0]]
+    sides = [looks]
+    if kind == "hinge":
+        sides += [looks - [thickness, 0.0, 0.0] for thickness in _THICKNESSES]
+
+    def off(place: Float[np.ndarray, "n 3"]) -> float:
+        distances = np.minimum(tree.query(place, distance_upper_bound=_FAR)[0], _FAR)
+        if hidden is not None:
+            distances = np.where(hidden(place), np.minimum(distances, _HIDDEN * _FAR), distances)
+        nearest = np.sort(distances)
+        return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
 
     def misfit(opening: float) -> float:
         motion = part.motion(opening)
-        moved = [transform(motion, each) for each in sides]
-        off = np.min(
-            [np.minimum(tree.query(p, distance_upper_bound=_FAR)[0], _FAR) for p in moved], axis=0
-        )
-        if hidden is not None:
-            unseen = np.all([hidden(p) for p in moved], axis=0)
-            off = np.where(unseen, np.minimum(off, _HIDDEN * _FAR), off)
-        nearest = np.sort(off)
-        return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
+        return min(off(transform(motion, side)) for side in sides)
 
     coarse, fine = _STEPS[kind]
     ends = [part.opening, part.opening if before is None else before]
@@ -76,4 +86,25 @@ def found_opening(
     best = min([best, *near], key=misfit)
     if misfit(best) > _BETTER * misfit(part.opening):
         best = part.opening
+    if kind == "hinge" and best < _NEARLY_SHUT:
+        tilt = _tilt(part, points)
+        best = best if tilt is None else tilt
     return 0.0 if best < _SHUT[kind] else float(best)
+
+
+def _tilt(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float | None:
+    """How far a door that is nearly shut stands open, by how far each point of it is before its front [rad].
+
+    None where too little of what is seen there is before the front.
+    """
+    low, high = part.panel
+    behind = ((points > low + _MARGIN) & (points < high - _MARGIN))[:, 1:].all(axis=1)
+    joint = part.part.joint
+    # By how much a point goes outwards for a small turn; those far from the hinge tell most.
+    lever = np.cross(joint.axis, points - joint.origin)[:, 0]
+    behind &= lever > _FAR_FROM_HINGE * lever[behind].max(initial=0.0)
+    out = points[:, 0] - high[0]
+    on = behind & (out > -_MARGIN) & (out < _NEARLY_SHUT * lever + _MARGIN)
+    if on.sum() < max(_TELLING, _MOST_SEEN * behind.sum()):
+        return None
+    return max(float(np.median(out[on] / lever[on])), 0.0)

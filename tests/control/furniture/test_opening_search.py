@@ -110,3 +110,14 @@ def test_a_push_that_moved_nothing_is_noticed():
     points = transform(part.motion(1.4), part.looks)
     assert found_opening(part.at(0.0), points) == 0.0
     assert found_opening(part.at(0.0), points, before=1.5) == pytest.approx(1.4, abs=0.05)
+
+
+@pytest.mark.parametrize("opening", [0.0, 0.05, 0.083, 0.15])
+def test_a_door_that_is_not_quite_shut_is_measured_by_its_tilt(opening):
+    part = a_part("hinge")
+    seen = transform(part.motion(opening), part.looks)
+    seen = seen + np.random.default_rng(1).normal(0, 0.001, seen.shape)
+    # Its body, beside and behind it.
+    body = plane([FRONT - 0.004, -0.3, 0.0], [FRONT - 0.004, 0.3, 0.1])
+    found = found_opening(part.at(0.0), np.concatenate([seen, body]))
+    assert found == pytest.approx(opening, abs=0.012)
