@@ -54,7 +54,7 @@ class DeniedTask(ManipulationTask):
         task = object.__getattribute__(self, "_task")
         if name.startswith("__"):
             return object.__getattribute__(self, name)
-        if name in ("goals", "furniture_masks", "control_timestep"):
+        if name in ("goals", "furniture_masks", "surroundings_masks", "control_timestep"):
             return getattr(task, name)
         if name == "robot":
             return _Robot(task.robot)
