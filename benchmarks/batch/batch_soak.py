@@ -24,6 +24,7 @@ import numpy as np
 from jaxtyping import Int
 
 from manipose_mj import batch
+from manipose_mj.batch.capacity import Capacity
 from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.poses import Array
@@ -60,13 +61,22 @@ def main() -> None:
     parser.add_argument("--objects", nargs="+", help="names of objects, instead of all")
     parser.add_argument("--starts", type=int, default=32, help="drawn before")
     parser.add_argument("--row", type=float, default=60.0, help="seconds of a row")
+    parser.add_argument(
+        "--room",
+        nargs=2,
+        type=float,
+        metavar=("CONTACTS", "ROWS"),
+        help="of a world, of engine warp",
+    )
     arguments = parser.parse_args()
     compile_at_once_on_gpus()
+    room = arguments.room
     worlds = batch.make(
         arguments.task,
         worlds=arguments.worlds,
         seeds=range(min(arguments.starts, arguments.worlds)),
         engine=arguments.engine,
+        capacity=None if room is None else Capacity(room[0], int(room[1])),
         objects=arguments.objects,
         reward_mode="dense",
     )

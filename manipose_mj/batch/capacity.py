@@ -25,6 +25,8 @@ PROBED = 8  # starts
 MARGIN = 1.5  # of what the probe saw
 # On top of that: a hand that closes on what no probed hand closed on.
 MORE_CONTACTS, MORE_CONSTRAINTS = 16, 96
+# And for each part of furniture: jammed in its frame it has 48 rows, and an arm seldom jams all of them at once.
+PART_CONSTRAINTS = 26
 # Control steps: to above the object, down onto it, closing, lifting; then to joint angles drawn at random.
 _PHASES = (30, 35, 15, 20)
 _DRAWN_TARGETS, _HELD = 4, 25
@@ -59,10 +61,12 @@ class Peaks:
     Attributes:
       contacts: Of each; or pairs of shapes near each other, where these were more.
       constraints: Rows of each.
+      parts: Of furniture in a world, at most: drawers, doors and knobs.
     """
 
     contacts: Int[np.ndarray, " probed"]
     constraints: Int[np.ndarray, " probed"]
+    parts: int = 0
 
     def capacity(self, worlds: int) -> Capacity:
         """Room for so many worlds, with a margin.
@@ -71,7 +75,8 @@ class Peaks:
         """
         mean, most = float(self.contacts.mean()), float(self.contacts.max())
         contacts = MARGIN * (mean + (most - mean) / worlds**0.5) + MORE_CONTACTS
-        constraints = MARGIN * int(self.constraints.max()) + MORE_CONSTRAINTS
+        more = MORE_CONSTRAINTS + PART_CONSTRAINTS * self.parts
+        constraints = MARGIN * int(self.constraints.max()) + more
         return Capacity(contacts, int(np.ceil(constraints)))
 
 
@@ -107,7 +112,15 @@ def probe(pool: StartPool) -> Peaks:
                 targets[world, 7] = MAX_OPENING if phase < 2 else 0.0
         if step >= sum(_PHASES) and (step - sum(_PHASES)) % _HELD == 0:
             targets = _drawn(rng, len(rows))
-    return Peaks(peaks[:, 0], peaks[:, 1])
+    jointed = max(_parts(pool.scenes[start.scene], start.addresses.servos) for start in pool.starts)
+    return Peaks(peaks[:, 0], peaks[:, 1], jointed)
+
+
+def _parts(model: mujoco.MjModel, at: ServoAddresses) -> int:
+    """How many drawers, doors and knobs a scene has: what turns or slides and is not the robot."""
+    single = np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
+    robot = [*range(model.nq)[at.angles], *range(model.nq)[at.fingers]]
+    return int((single & ~np.isin(model.jnt_qposadr, robot)).sum())
 
 
 def _towards(

@@ -61,6 +61,25 @@ def test_one_world_can_be_the_worst_and_many_are_as_the_average():
     assert many.constraints == 696  # rows are not shared
 
 
+def test_two_drawers_that_jam_have_room():
+    """A part that is pushed askew meets its frame in many places; the probe's hands need not have done so."""
+    objects = ("cabinet_000", "chips_can_000")
+    config = EnvConfig("articulated/store_chips_can_middle_drawer", objects=objects)
+    pool = draw_pool(config, range(1))
+    peaks = probe(pool)
+    assert peaks.parts == 4
+    rng, most = np.random.default_rng(0), 0
+    for _ in range(20):
+        model, data = at_start(pool, 0)
+        drawers = [i for i in range(model.nbody) if model.body(i).name.endswith("_drawer")]
+        pushed = rng.choice(drawers, 2, replace=False)
+        data.xfrc_applied[pushed] = rng.normal(size=(2, 6)) * [300, 300, 300, 60, 60, 60]
+        for _ in range(40):
+            mujoco.mj_step(model, data)
+            most = max(most, data.nefc)
+    assert peaks.constraints.max() < most < peaks.capacity(8192).constraints
+
+
 def test_room_for_nothing_is_refused():
     with pytest.raises(InputError, match="contacts is 0"):
         Capacity(0, 100)
