@@ -99,6 +99,11 @@ class Scene:
         """All of them, in play or waiting."""
         return () if self.furniture is None else self.furniture.entities
 
+    @property
+    def masks(self) -> dict[composer.Entity, int]:
+        """Id in segmentations of what they tell apart."""
+        return {entity: number for number, entity in enumerate(self.instances.values(), start=1)}
+
     def write(self, physics: mjcf.Physics, start: EpisodeStart) -> None:
         """Put everything where an episode starts; the robot and the model's changes are not touched.
 

@@ -148,15 +148,15 @@ class ManipulationTask(composer.Task):
     @property
     def furniture_masks(self) -> tuple[tuple[str, int], ...]:
         """Category of each piece of furniture in play, and its id in segmentations."""
-        numbers = {entity: n for n, entity in enumerate(self.scene.instances.values(), start=1)}
-        return tuple((piece.asset.category, numbers[piece]) for piece in self.articulated_objects)
+        masks = self.scene.masks
+        return tuple((piece.asset.category, masks[piece]) for piece in self.articulated_objects)
 
     @property
     def surroundings_masks(self) -> tuple[int, ...]:
         """Ids in segmentations of what stands around objects and furniture: all else, and fixtures such as a shelf."""
-        numbers = {entity: n for n, entity in enumerate(self.scene.instances.values(), start=1)}
+        masks = self.scene.masks
         fixtures = self.scene.fixtures.values()
-        return (0, *(numbers[each] for each in fixtures if each in numbers))
+        return (0, *(masks[each] for each in fixtures if each in masks))
 
     @property
     def object_name(self) -> str:
