@@ -11,7 +11,8 @@ import pytest
 from manipose_mj.assets import catalogue
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution.executor import Executor
-from manipose_mj.control.execution.primitives import Primitives, retraction_of
+from manipose_mj.control.execution.lifting import retraction_of
+from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import episode

@@ -9,8 +9,9 @@ from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.execution.letting_go import opening_to_let_go, retreat_from
+from manipose_mj.control.execution.lifting import retraction_of
 from manipose_mj.control.execution.part_lead import lead_part
-from manipose_mj.control.execution.slip import exceeds, pose_in_hand, slip_of
+from manipose_mj.control.execution.slip import closed_past, exceeds, pose_in_hand, slip_of
 from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
 from manipose_mj.control.grasping.part_pick import (
@@ -25,7 +26,6 @@ from manipose_mj.control.grasping.retraction import (
     Place,
     find_place,
     lowering,
-    retractions,
     transport_path,
 )
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -123,7 +123,9 @@ class Primitives:
         yield from self._executor.follow(pick.approach)
         yield from self._executor.close()
         estimate = self._executor.observe()
-        if estimate.opening < min(0.5 * pick.width, pick.width - 0.004):
+        if closed_past(estimate, name, pick.width):
+            if name in estimate.objects and estimate.objects[name].uncertainty > 0:
+                self._slipped.setdefault(name, []).append(pose_in_hand(estimate, name))
             yield from self._let_go(planner, name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
         self._executor.hold(name)
@@ -351,20 +353,6 @@ def _can_be_pushed_on(part: PartEstimate, opening: float | None) -> bool:
     """Whether it is a door, wide enough open to be pushed open further from inside."""
     ajar = part.joint.kind == "hinge" and part.opening > part.joint.range[0] + AJAR
     return ajar and opening is not None and opening > part.opening
-
-
-def retraction_of(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str
-) -> Float[np.ndarray, "t 7"]:
-    """Joint targets that lift a held object off its support.
-
-    Raises:
-      StageFailure: There is no way.
-    """
-    way = way_out(estimate, estimate.objects[name].label_pose[:3, 3])
-    for retraction in retractions(planner, estimate.joints, estimate.in_hand(name), way):
-        return retraction
-    raise StageFailure("plan", f"no way to lift {name}")
 
 
 def _place(

@@ -8,6 +8,23 @@ from jaxtyping import Float
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.poses import invert, pose_error, rotation_angle
 
+_SOMETHING = 0.0015  # between fingers that are not shut [m]
+
+
+def closed_past(estimate: SceneEstimate, name: str, width: float) -> bool:
+    """Whether fingers that have closed on something have it not between them.
+
+    Args:
+      estimate: After they closed.
+      name: Of the object or part.
+      width: That the grasp should have [m].
+    """
+    least = min(0.5 * width, width - 0.004)
+    obj = estimate.objects.get(name)
+    if obj is not None and obj.uncertainty > 0:
+        least = min(least, _SOMETHING)  # a wall may be thinner than its surface seems to be
+    return estimate.opening < least
+
 
 def pose_in_hand(estimate: SceneEstimate, name: str) -> Float[np.ndarray, "4 4"]:
     """`T_tcp_label` of an object, or of a part's handle."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Plan, Step
 from manipose_mj.control.planning.regrasp import Poses, routes
@@ -14,9 +16,13 @@ from manipose_mj.control.planning.table_places import (
     upright_poses,
 )
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
-from manipose_mj.tasks.goals import OrientationGoal, PoseGoal, UprightGoal
+from manipose_mj.poses import pose_error
+from manipose_mj.tasks.goals import Goal, OrientationGoal, PoseGoal, UprightGoal
+from manipose_mj.tasks.goals.conditions import Tolerance
 
 RestGoal = PoseGoal | OrientationGoal | UprightGoal
+# By how much more than a task tolerates an object is seen to lie wrong, before that is believed.
+_DOUBT = 1.15
 
 
 def transport_plans(
@@ -39,6 +45,22 @@ def transport_plans(
     if isinstance(goal, OrientationGoal):
         for at_edge in poses_at_edge(obj, goal.rotation):
             yield place(goal.object, at_edge)
+
+
+def lie_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
+    """Whether an object is seen to lie otherwise than a goal has it."""
+    symmetries = {name: obj.label.symmetry for name, obj in estimate.objects.items()}
+    most = Tolerance()
+    for goal in goals:
+        frame = goal.goal_frame(symmetries) if isinstance(goal, RestGoal) else None
+        if frame is None:
+            continue
+        pose = estimate.objects[frame.object].label_pose
+        shift, turn = pose_error(pose, np.asarray(frame.pose), frame.symmetry)
+        moved = frame.translation_counts and shift > _DOUBT * most.translation
+        if moved or (frame.rotation_counts and turn > _DOUBT * most.rotation):
+            return True
+    return False
 
 
 def place_at_each(name: str, stops: tuple[Poses, ...]) -> Plan:
