@@ -22,7 +22,7 @@ from manipose_mj.tasks.goals.conditions import Tolerance
 
 RestGoal = PoseGoal | OrientationGoal | UprightGoal
 # By how much more than a task tolerates an object is seen to lie wrong, before that is believed.
-_DOUBT = 1.15
+_BEYOND = 1.15
 
 
 def transport_plans(
@@ -57,8 +57,8 @@ def lie_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
             continue
         pose = estimate.objects[frame.object].label_pose
         shift, turn = pose_error(pose, np.asarray(frame.pose), frame.symmetry)
-        moved = frame.translation_counts and shift > _DOUBT * most.translation
-        if moved or (frame.rotation_counts and turn > _DOUBT * most.rotation):
+        moved = frame.translation_counts and shift > _BEYOND * most.translation
+        if moved or (frame.rotation_counts and turn > _BEYOND * most.rotation):
             return True
     return False
 
