@@ -46,6 +46,11 @@ class PoseLabel:
         """`T_mesh_label`."""
         return compose(self.rotation, self.origin)
 
+    @property
+    def bounds(self) -> Float[np.ndarray, "2 3"]:
+        """Lower and upper corner of the bounding box in the label frame [m]."""
+        return self.center + np.outer([-0.5, 0.5], self.extents)
+
     def reach(self, rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
         """Half the lengths that the object takes up along the axes of a frame [m].
 

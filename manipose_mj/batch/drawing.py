@@ -33,7 +33,9 @@ from manipose_mj.tasks.scene.indices import FIRST, NOBODY, SceneShapes, find_ind
 OBSERVED = ("state", "pose")  # modes
 # Makes other starts of an environment that was reset to one; how many there are is the caller's business.
 Vary = Callable[[TaskEnvironment, EpisodeStart], Iterable[EpisodeStart]]
-_CONSTANT = ("pose/symmetry/", "pose/symmetry_count/", "pose/axial/", "pose/counts/")
+_CONSTANT = tuple(
+    f"pose/{kind}/" for kind in ("symmetry", "symmetry_count", "axial", "bounds", "counts")
+)
 
 
 @dataclass(frozen=True)

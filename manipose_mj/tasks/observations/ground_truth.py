@@ -3,7 +3,7 @@
 | observation | tells | why |
 |---|---|---|
 | `pose/...` | true poses | objects, goals, handles, joint axes and openings, read from the state |
-| `pose/symmetry/...`, `symmetry_count/...`, `axial/...`, `counts/...` | neither | what holds in any pose: symmetry, and what a goal asks for |
+| `pose/symmetry/...`, `symmetry_count/...`, `axial/...`, `bounds/...`, `counts/...` | neither | what holds in any pose: symmetry, size, and what a goal asks for |
 | `segmentation/...` | true instance masks | which pixel belongs to which object |
 | `pointcloud/points`, `pointcloud/colours` | neither | a depth image and its colours, as a sensor gives them |
 | all other `pointcloud/...` | true instance masks | the points' instances, a cloud of each object; normals are fitted within an object's mask |
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_POSELESS = ("symmetry", "symmetry_count", "axial", "counts")
+_POSELESS = ("symmetry", "symmetry_count", "axial", "bounds", "counts")
 _MASKLESS = ("pointcloud/points", "pointcloud/colours")
 
 

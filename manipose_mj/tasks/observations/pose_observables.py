@@ -4,6 +4,7 @@ Of each frame, by its name: `pose/NAME` is `T_world_frame`; `pose/robot/NAME` th
 base frame; `pose/cameras/NAME` in each camera's (OpenCV's axes, in the order of the configuration).
 `pose/symmetry/NAME` holds the rotations of its symmetry group, `pose/symmetry_count/NAME` how
 many of them count, `pose/axial/NAME` whether every turn about X belongs to the group as well.
+`pose/bounds/NAME` are the lower and the upper corner of an object's bounding box in its frame [m].
 `pose/counts/NAME` says of a goal whether its translation and whether its rotation counts.
 `pose/opening_PART` is a joint's position. What an episode does not have is zeros, with a count of 0.
 """
@@ -110,6 +111,8 @@ class PoseObservables:
             show(f"symmetry_count/{name}", count, lambda p, n=name: self._symmetry(p, n)[1])
             axial = bounded((1,), np.int32, 0, 1)
             show(f"axial/{name}", axial, lambda p, n=name: self._symmetry(p, n)[2])
+        for name in self._slots.objects:
+            show(f"bounds/{name}", unbounded((2, 3)), lambda p, n=name: self._bounds(p, n))
         for name in self._slots.goals:
             counts = bounded((2,), np.int32, 0, 1)
             show(f"counts/{name}", counts, lambda p, n=name: self._counts(p, n))
@@ -202,6 +205,7 @@ class PoseObservables:
             ids=np.array([int(physics.bind(t.body).element_id) for t in present], int),
             poses=np.stack([t.pose for t in present]) if present else np.zeros((0, 4, 4)),
             symmetries={name: padded_group(group, name) for name, group in groups.items()},
+            bounds={name: entity.asset.label.bounds for name, entity in objects.items()},
             goals=goals,
             openings={
                 part.name: int(np.asarray(physics.bind(piece.joint(part.name)).qposadr).item())
@@ -218,6 +222,9 @@ class PoseObservables:
             return np.zeros((MAX_TURNS, 3, 3)), [0], [False]
         return group
 
+    def _bounds(self, physics: mjcf.Physics, name: str) -> Float[np.ndarray, "2 3"]:
+        return self.carriers(physics).bounds.get(name, np.zeros((2, 3)))
+
     def _counts(self, physics: mjcf.Physics, name: str) -> tuple[bool, bool]:
         goal = self.carriers(physics).goals.get(name)
         return (False, False) if goal is None else (goal.translation_counts, goal.rotation_counts)
@@ -230,12 +237,13 @@ class PoseObservables:
 
 @dataclass(frozen=True)
 class FrameCarriers:
-    """An episode's frames: `rows` among the names, body `ids`, `T_body_frame`; its goals."""
+    """An episode's frames: `rows` among the names, body `ids`, `T_body_frame`; boxes of objects; its goals."""
 
     rows: Int[np.ndarray, "n"]
     ids: Int[np.ndarray, "n"]
     poses: Float[np.ndarray, "n 4 4"]
     symmetries: dict[str, tuple[np.ndarray, list[int], list[bool]]]
+    bounds: dict[str, Float[np.ndarray, "2 3"]]
     goals: dict[str, GoalFrame]
     openings: dict[str, int]
 

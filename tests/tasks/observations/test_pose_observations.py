@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.ray_camera import camera_pose
@@ -46,6 +47,17 @@ def test_the_symmetry_is_the_labels(ideal):
         np.testing.assert_allclose(turns[:count], group.rotations, atol=1e-12)
         assert not turns[count:].any()
         assert bool(observation["pose/axial/object"][0]) == group.axial
+
+
+def test_the_bounds_hold_the_object_and_no_more(ideal):
+    for _ in range(3):
+        observation = ideal.reset().observation
+        asset = ideal.task.objects["object"].asset
+        meshes = [trimesh.load_mesh(f).vertices for f in asset.folder.glob("meshes/*_visual_*.obj")]
+        vertices = (np.vstack(meshes) - asset.label.origin) @ asset.label.rotation
+        lower, upper = observation["pose/bounds/object"]
+        np.testing.assert_allclose(lower, vertices.min(axis=0), atol=2e-3)
+        np.testing.assert_allclose(upper, vertices.max(axis=0), atol=2e-3)
 
 
 def test_a_group_that_is_too_large_is_refused():
