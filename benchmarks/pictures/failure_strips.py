@@ -32,6 +32,7 @@ from manipose_mj.mjcf.views.film import film_strip
 
 PICTURES, HEIGHT, WIDTH = 5, 150, 200
 CAMERA = "overview"
+POSES = ("true", "true, other seeds", "estimated")
 
 
 def grasps_of(run: Mapping[str, Any]) -> GraspSource:
@@ -39,9 +40,16 @@ def grasps_of(run: Mapping[str, Any]) -> GraspSource:
     return run.get("grasps") or ("annotated" if run.get("pose") == "oracle" else "shape")
 
 
+def poses_of(run: Mapping[str, Any]) -> str:
+    """What a run was told of objects, and of which starts, one of `POSES`."""
+    if run.get("pose") != "oracle":
+        return "estimated"
+    return "true" if run.get("resample") is None else "true, other seeds"
+
+
 def strip_name(result: EpisodeResult, poses: str) -> str:
     """The file of an episode's strip."""
-    return f"{result.task.replace('/', '__')}-{result.episode}-{poses}.webp"
+    return f"{result.task.replace('/', '__')}-{result.episode}-{poses.replace(', ', '-').replace(' ', '-')}.webp"
 
 
 def draw_strips(records: Sequence[RunRecord], folder: Path) -> None:
@@ -49,7 +57,7 @@ def draw_strips(records: Sequence[RunRecord], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     wanted = set()
     for record in records:
-        poses = "true" if record.run.get("pose") == "oracle" else "estimated"
+        poses = poses_of(record.run)
         for result in record.results:
             if result.failure is None:
                 continue
@@ -77,6 +85,7 @@ def _strip(record: RunRecord, result: EpisodeResult) -> bytes:
             episodes=result.episode + 1,
             pose=run["pose"],
             protocol=run["protocol"],
+            resample=run["resample"],
             grasps=grasps_of(run),
         )
         runner = BaselineRunner(config.planner, grasps=config.grasps)

@@ -105,10 +105,7 @@ def test_a_table_of_a_page_is_that_of_the_plot():
 
 
 def test_the_page_of_the_protocol_is_that_of_the_cards(manipulation):
-    records = [
-        manipulation.read_run(manipulation.LEADERBOARD / card / "runs" / "0")
-        for card in manipulation.CARDS
-    ]
+    records = manipulation.baseline_records()
     episodes = [each for record in records for each in manipulation.episodes_of(record)]
     results = DOCS / "results"
     assert read(results / "protocol_v1.md") == manipulation.page(episodes, results / "failures")
