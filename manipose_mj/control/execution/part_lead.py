@@ -21,6 +21,8 @@ from manipose_mj.failures import StageFailure
 _HELD = replace(CONTACT, arm=-0.004, target=-0.02)
 _EVERY = 4  # control steps between looks at where the hand is
 _BESIDE = 0.004  # how far the hand may be beside its path before the joint is corrected [m]
+# Up and down with a drawer, which slides level: the pull lifts the hand by some millimetres.
+_LIFTED = 0.012
 # Way after which the joint is corrected whatever it is [m], and how often: fingers that are led astray slide on a bar, and
 # tell nothing any more.
 _FIRST, _AT_FIRST = 0.02, 4
@@ -83,7 +85,8 @@ def lead_part(executor: Executor, planner: MotionPlanner, name: str, opening: fl
             break
         hinge = part.joint.kind == "hinge"
         short = count < (_AT_FIRST if hinge else 1)
-        done = yield from _follow(executor, way, trace, short)
+        heeded = np.array([1.0, 1.0, 1.0 if hinge else _BESIDE / _LIFTED])
+        done = yield from _follow(executor, way, trace, short, heeded)
         executor.feel(name, np.array(trace.path), trace.stopped)
         yield from executor.relax()
         estimate = executor.observe()
@@ -115,8 +118,12 @@ def _way(
     return None if way is None else ending_free(planner, part, way, _HELD)
 
 
-def _follow(executor: Executor, way: PartWay, trace: _Trace, short: bool) -> Iterator[Action]:
+def _follow(
+    executor: Executor, way: PartWay, trace: _Trace, short: bool, heeded: Float[np.ndarray, "3"]
+) -> Iterator[Action]:
     """Go along a way until it ends, the hand leaves it, or goes no further; a `short` piece of it at most.
+
+    `heeded` are the weights of how far the hand is off its way, along x, y and z.
 
     Returns:
       Whether it came to the end.
@@ -138,7 +145,7 @@ def _follow(executor: Executor, way: PartWay, trace: _Trace, short: bool) -> Ite
         trace.path.append(now)
         place = now[:3, 3]
         recent = [*recent, place][-(_PATIENCE // _EVERY) - 1 :]
-        beside = float(np.linalg.norm(places[: step + 1] - place, axis=1).min())
+        beside = float(np.linalg.norm(heeded * (places[: step + 1] - place), axis=1).min())
         behind = float(np.linalg.norm(places[step] - place))
         still = len(recent) > _PATIENCE // _EVERY and _reach(recent) < _STILL
         if behind > _STUCK and still:

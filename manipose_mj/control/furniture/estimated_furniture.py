@@ -21,6 +21,7 @@ from manipose_mj.control.furniture.part_sensing import PartSensor
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
 from manipose_mj.control.furniture.pulled_out import pulled_out
 from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
+from manipose_mj.control.furniture.stops import Stops
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
@@ -31,7 +32,6 @@ from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
 _SURE_PART = 0.15  # confidence of parts that nobody asked for
-_END = {"slide": 0.5, "hinge": 0.8}  # of the usual range, from which on a stop is its end
 _LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
@@ -72,6 +72,7 @@ class EstimatedFurniture:
         self._mask = 0
         self._held: _Held | None = None
         self._moved: set[str] = set()
+        self._stops = Stops()
         self._felt: dict[str, Joint] = {}  # hinges that a long arc of the hand has corrected
         self._before: dict[
             str, float
@@ -84,7 +85,7 @@ class EstimatedFurniture:
           StageFailure: No part is found that a goal could mean.
         """
         self.model, self._held, self._moved = None, None, set()
-        self._before, self._felt = {}, {}
+        self._before, self._felt, self._stops = {}, {}, Stops()
         for category, mask in self._task.furniture_masks:
             self._mask = mask
             seen = self._cloud(self._front_cameras)
@@ -225,8 +226,7 @@ class EstimatedFurniture:
         if stopped:
             self._before[name] = started  # a hand that slips goes on without the part
         low, high = part.part.joint.range
-        # A hand that slips off before is none that came to the end.
-        ends = stopped and opening > _END[joint.kind] * high
+        ends = stopped and self._stops.is_end(name, joint.kind, opening, high)
         joint = replace(joint, range=(low, opening if ends else max(high, opening)))
         moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
         # Where the hand would be were the part shut, by the joint as it is known now.

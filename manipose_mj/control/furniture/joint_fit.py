@@ -19,6 +19,9 @@ _LEAST_NOISE = 0.0002  # the same where it holds it well [m]
 _OFFSET = 0.008  # standard deviation of the bar's place in the hand, about which the hand turns [m]
 _AXIS = np.radians(15.0)  # standard deviations of what clouds say: of an axis' direction,
 _PLACE = 0.06  # and of a hinge's place [m]
+_LEVEL = np.radians(
+    0.2
+)  # of drawers, which slide level; a hand that pulls is a few millimetres off its way
 _SURE_AXIS, _SURE_PLACE = np.radians(3.0), 0.008  # the same of what a long arc has said before
 _SHORT = 0.006  # ways that are shorter tell nothing [m]
 _CURVED = 3.0  # how many times better a hinge must fit for a drawer to be a door
@@ -70,9 +73,11 @@ def _fitted_slide(joint: Joint, path: Float[np.ndarray, "n 3"]) -> FittedJoint:
         along = -along
     length = float(np.linalg.norm(offset, axis=1).max())
     certain, prior = (length / _NOISE) ** 2, 1 / _AXIS**2
-    axis = (certain * along + prior * joint.axis) / (certain + prior)
+    # Led up or down, the bar would slip out of the hand.
+    level = np.array([0.0, 0.0, 1 / _LEVEL**2])
+    axis = (certain * along + prior * joint.axis) / (certain + prior + level)
     axis /= np.linalg.norm(axis)
-    off = offset - (offset @ axis)[:, None] * axis
+    off = offset - (offset @ along)[:, None] * along
     misfit = float(np.sqrt((off**2).sum(axis=1).mean()))
     return FittedJoint(replace(joint, axis=axis), misfit, np.zeros(3))
 

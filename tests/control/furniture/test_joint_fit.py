@@ -94,3 +94,12 @@ def test_openings_are_what_brought_a_point_there():
     assert opening_of(HINGE, HANDLE, arc(0.7)[-1]) == pytest.approx(0.7, abs=0.01)
     slide = Joint("slide", HANDLE, AHEAD, (0.0, 0.3))
     assert opening_of(slide, HANDLE, HANDLE + [0.12, 0.03, 0.0]) == pytest.approx(0.12)
+
+
+def test_a_drawer_slides_level_though_the_pull_lifts_the_hand():
+    joint = Joint("slide", HANDLE, AHEAD, (0.0, 0.3))
+    way = np.linspace(0, 0.1, 30)[:, None]
+    lifted = HANDLE + way * AHEAD + 0.05 * way * UP
+    found = fitted_joint(joint, poses(lifted)).joint
+    assert found.kind == "slide"
+    assert angle(found.axis, AHEAD) < 0.3
