@@ -133,15 +133,13 @@ def tables(episodes: Sequence[Played]) -> str:
     return "\n".join(f"## By {name}\n\n{table(episodes, name)}" for name in telling)
 
 
-def table(episodes: Iterable[Played], by: str) -> str:
+def table(episodes: Sequence[Played], by: str) -> str:
     """Success and failures by what was told of objects, a row for each group."""
     groups: dict[str, list[Played]] = {}
     for each in episodes:
         groups.setdefault(GROUPS[by](each), []).append(each)
     order = list(FAMILIES) if by == "family" else sorted(groups)
-    shown = [
-        poses for poses in POSES if any(e.poses == poses for own in groups.values() for e in own)
-    ]
+    shown = [poses for poses in POSES if any(each.poses == poses for each in episodes)]
     titles = [f"{poses} | failures" for poses in shown]
     lines = [f"| {by} | {' | '.join(titles)} |", "| --- |" + " --- |" * 2 * len(shown)]
     for name in order:
