@@ -107,7 +107,14 @@ class Primitives:
             opening = None if destination is None else destination.opening
             part = estimate.parts[name]
             try:
-                pick = pick_part(planner, estimate, part, opening, in_stages=self.in_stages)
+                pick = pick_part(
+                    planner,
+                    estimate,
+                    part,
+                    opening,
+                    in_stages=self.in_stages,
+                    following=self._executor.feels_joints,
+                )
             except StageFailure:
                 if not self.in_stages or not _can_be_pushed_on(part, opening):
                     raise

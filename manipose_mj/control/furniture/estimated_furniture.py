@@ -17,11 +17,18 @@ from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartMo
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import found_opening
-from manipose_mj.control.furniture.part_sensing import PartSensor
+from manipose_mj.control.furniture.part_sensing import (
+    ONE_DOOR,
+    PartSensor,
+    SensedFurniture,
+    SensedPart,
+    with_open_door,
+)
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
 from manipose_mj.control.furniture.pulled_out import pulled_out
 from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
 from manipose_mj.control.furniture.stops import Stops
+from manipose_mj.control.furniture.swung_out import as_seen_open, swung_out
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
@@ -73,7 +80,8 @@ class EstimatedFurniture:
         self._held: _Held | None = None
         self._moved: set[str] = set()
         self._stops = Stops()
-        self._felt: dict[str, Joint] = {}  # hinges that a long arc of the hand has corrected
+        # Hinges that an open panel or a long arc of the hand has shown.
+        self._sure: dict[str, Joint] = {}
         self._before: dict[
             str, float
         ] = {}  # openings of parts that were pushed, or that the hand slipped off, and not looked at since
@@ -85,7 +93,7 @@ class EstimatedFurniture:
           StageFailure: No part is found that a goal could mean.
         """
         self.model, self._held, self._moved = None, None, set()
-        self._before, self._felt, self._stops = {}, {}, Stops()
+        self._before, self._sure, self._stops = {}, {}, Stops()
         for category, mask in self._task.furniture_masks:
             self._mask = mask
             seen = self._cloud(self._front_cameras)
@@ -93,7 +101,7 @@ class EstimatedFurniture:
                 raise StageFailure("perception", f"no camera sees enough of the {category}")
             pose = self._views.camera_pose(self._physics, self._front_cameras[0])
             cloud, asked = self._cloud(), asked_parts(self._task)
-            found: list[FurnitureModel] = []
+            found: list[tuple[SensedFurniture, FurnitureModel]] = []
             # Through all cameras as well where what stands open did not show.
             for each in (seen, cloud):
                 try:
@@ -101,22 +109,37 @@ class EstimatedFurniture:
                 except InputError as error:
                     raise StageFailure("perception", f"{category}: {error}") from None
                 model = fit_furniture(cloud, sensed, category)
-                found.append(_named(model, asked, self._expected_open))
-                parts = {part.name: part.opening for part in found[-1].parts}
-                if all(parts[name] > 0 for name in self._expected_open):
+                found.append((sensed, _named(model, asked, self._expected_open)))
+                if not self._looks_shut(found[-1][1]):
                     break
             else:
                 found.reverse()
-            self.model = self._with_drawers_out(found[-1], cloud, asked)
+            self.model = self._with_open_parts(*found[-1], cloud, asked)
 
-    def _with_drawers_out(
-        self, model: FurnitureModel, cloud: SceneCloud, asked: Mapping[str, str]
-    ) -> FurnitureModel:
-        """With drawers that should stand open, and look shut, where a front stands out of the body."""
+    def _looks_shut(self, model: FurnitureModel) -> list[str]:
+        """Of the parts that should stand open, those that do not."""
         openings = {part.name: part.opening for part in model.parts}
+        return [name for name in sorted(self._expected_open) if openings[name] == 0.0]
+
+    def _with_open_parts(
+        self,
+        sensed: SensedFurniture,
+        model: FurnitureModel,
+        cloud: SceneCloud,
+        asked: Mapping[str, str],
+    ) -> FurnitureModel:
+        """With what should stand open as a front or a door stands out of the body."""
+        shut = self._looks_shut(model)
         for name in sorted(self._expected_open):
-            if openings[name] == 0.0 and "drawer" in asked.get(name, "").split():
-                model = pulled_out(model, cloud, name) or model
+            if "drawer" in asked.get(name, "").split():
+                model = (pulled_out(model, cloud, name) if name in shut else None) or model
+            elif (door := swung_out(model, cloud)) is not None:
+                sensed = with_open_door(sensed, door)
+                model = fit_furniture(cloud, sensed, model.category)
+                model = _named(model, asked, self._expected_open)
+                part = next(part for part in model.parts if part.name == name)
+                if part.opening > 0.0:
+                    self._sure[name] = part.part.joint
         return model
 
     @property
@@ -216,13 +239,13 @@ class EstimatedFurniture:
         own = invert(model.pose) @ path
         held = self._held
         started = opening_of(part.part.joint, held.start, points_of(own[:1], held.offset)[0])
-        known = self._felt.get(name)
+        known = self._sure.get(name)
         fitted = fitted_joint(known or part.part.joint, own, sure=known is not None)
         joint, went = fitted.joint, points_of(own, fitted.offset)
         gone = opening_of(joint, went[0], went[-1])
         opening = started + gone
         if joint.kind == "hinge" and abs(gone) > _LONG_ARC and not stopped:
-            self._felt[name] = joint
+            self._sure[name] = joint
         if stopped:
             self._before[name] = started  # a hand that slips goes on without the part
         low, high = part.part.joint.range
@@ -249,12 +272,23 @@ class EstimatedFurniture:
             return
         cloud = self._cloud()
         points = transform(invert(model.pose), cloud.points)
+        doors = [part for part in model.parts if part.opening > 0.0 and part.hinged]
+        door = swung_out(model, cloud) if doors else None
         for part in model.parts:
             if part.opening > 0.0:
+                if door is not None and part.hinged and self._is_of(door, part):
+                    part = as_seen_open(part, door, model.pose)
+                    self._sure[part.name] = part.part.joint
                 found = part.at(found_opening(part, points, self._hidden()))
                 # What does not show stays as it is usual: nobody need look again.
                 model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
         self.model = model
+
+    def _is_of(self, door: SensedPart, part: PartModel) -> bool:
+        """Whether a door that stands open is this part: its handle is near where that of the part is."""
+        assert self.model is not None
+        handle = self.model.pose @ part.motion(part.opening) @ _handle(part).pose
+        return float(np.linalg.norm(handle[:3, 3] - door.handle[:3, 3])) < ONE_DOOR
 
     def _part(self, name: str | None) -> PartModel | None:
         parts = () if self.model is None else self.model.parts

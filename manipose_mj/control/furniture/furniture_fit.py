@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.body_shape import body_slices, ends_of
+from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, can_be_a_door, likely_hinge
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
@@ -33,6 +35,8 @@ _FACE, _FACE_LEAST = 0.012, 150
 _FREE_EDGE = 0.05  # of a door, from its handle [m]
 _TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
 _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
+# How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
+_BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
 _UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
 _MEET = 0.01  # handles nearer than this are one [m]
@@ -52,9 +56,14 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     normals = cloud.normals @ pose[:3, :3]
     shut = [_as_if_shut(part, pose) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
+    if category not in WITH_KNOBS:
+        for part in shut:
+            part.turn_as_doors_do(shut, bounds)
     if any(part.opening == 0.0 for part in shut):
         for part in shut:
             part.meet_front(points, normals, float(bounds[1, 0]))
+    for part in shut:
+        part.meet_swing(points, normals)
     parts = [
         _part(number, part, shut, points, normals, bounds, category)
         for number, part in enumerate(shut)
@@ -64,14 +73,27 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
 
 
 def _distinct(parts: list[PartModel]) -> list[PartModel]:
-    """Of parts whose fitted handles meet, or that turn about one hinge, the surest."""
+    """Of parts whose fitted handles meet, shut or as they stand, or that turn about one hinge, the surest."""
     kept: list[PartModel] = []
     for part in sorted(parts, key=lambda part: -part.confidence):
-        low, high = part.handle[0] + [[-_MEET], [_MEET]]
-        meets = [((low < o.handle[0, 1]) & (high > o.handle[0, 0])).all() for o in kept]
-        if not any(meets) and not any(_one_door(part, other) for other in kept):
+        if not any(_meet(part, other) or _one_door(part, other) for other in kept):
             kept.append(part)
     return kept
+
+
+def _meet(part: PartModel, other: PartModel) -> bool:
+    """Whether two handles take up one place, both shut or both as they stand."""
+    pairs = [(part.handle[0], other.handle[0]), (_handle_now(part), _handle_now(other))]
+    return any(
+        bool(((mine[0] - _MEET < its[1]) & (mine[1] + _MEET > its[0])).all()) for mine, its in pairs
+    )
+
+
+def _handle_now(part: PartModel) -> Float[np.ndarray, "2 3"]:
+    """Low and high corner of a handle's bar as it stands, object frame."""
+    corners = np.array(list(product(*part.handle[0].T)))
+    moved = transform(part.motion(part.opening), corners)
+    return np.stack([moved.min(axis=0), moved.max(axis=0)])
 
 
 def _one_door(part: PartModel, other: PartModel) -> bool:
@@ -119,6 +141,18 @@ class _Shut:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
 
+    def turn_as_doors_do(self, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"]) -> None:
+        """Where the estimated axis is no door's, turn about the likely edge."""
+        if self.kind == "slide":
+            return
+        between = _between_neighbours(self, others, bounds)
+        if can_be_a_door(self.axis, self.handle, between):
+            return
+        self.handle = invert(self.back) @ self.handle
+        self.opening, self.back = 0.0, np.eye(4)
+        between = _between_neighbours(self, others, bounds)
+        self.origin, self.axis = likely_hinge(self.handle, between)
+
     def meet_front(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float
     ) -> None:
@@ -130,6 +164,31 @@ class _Shut:
             self.opening += own - front
             self.back = compose(np.eye(3), -self.opening * self.axis)
             self.handle[:3, 3] -= (own - front) * self.axis
+
+    def meet_swing(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    ) -> None:
+        """Correct how far a door is open: shut, its panel faces out of the front, or into it."""
+        if self.kind == "slide" or self.opening == 0.0 or abs(self.axis[0]) > 0.1:
+            return
+        local = transform(self.back, points) - self.handle[:3, 3]
+        turned = normals @ self.back[:3, :3].T
+        on = (np.abs(local) < [_BESIDE_HANDLE / 2, _BESIDE_HANDLE, _BESIDE_HANDLE]).all(axis=1)
+        on &= np.abs(turned[:, 0]) > np.cos(_MISSWUNG)
+        if on.sum() < _FACE_LEAST:
+            return
+        faces = turned[on] * np.sign(turned[on, :1])
+        ahead = np.cross(self.axis, np.array([1.0, 0.0, 0.0]))  # where X goes as it opens
+        self._turn_back(float(np.median(np.arctan2(faces @ ahead, faces[:, 0]))))
+
+    def _turn_back(self, further: float) -> None:
+        """Take it to be further open than was thought [rad]."""
+        stands = invert(self.back) @ self.handle
+        self.opening += further
+        self.back = _motion(Joint("hinge", self.origin, self.axis, (0.0, 1.0)), -self.opening)
+        self.handle = self.back @ stands
+        # The handle was taken to be as far open as the panel.
+        self.handle[:3, :3] = _along_axes(self.handle[:3, :3], np.cos(_MISSWUNG))
 
 
 def _as_if_shut(part: SensedPart, pose: Float[np.ndarray, "4 4"]) -> _Shut:
@@ -149,10 +208,12 @@ def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     return np.eye(3)[nearest] * np.sign(axis[nearest])
 
 
-def _along_axes(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
-    """Along the axes of the body, where that is nearly so."""
+def _along_axes(
+    rotation: Float[np.ndarray, "3 3"], least: float = _SNAP
+) -> Float[np.ndarray, "3 3"]:
+    """Along the axes of the body, where that is nearly so: by this cosine or more."""
     nearest = np.round(rotation)
-    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > _SNAP:
+    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > least:
         return nearest
     return rotation
 
@@ -258,9 +319,28 @@ def _panel(
     part: _Shut, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"], front: float
 ) -> Float[np.ndarray, "2 3"]:
     """The rectangle between the handles of neighbours, the hinge and the body's sides."""
+    low, high = _between_neighbours(part, others, bounds)
+    own, half = part.handle[:3, 3], _half_handle(part)
+    if part.kind == "hinge":
+        axis = 1 if abs(part.axis[2]) > 0.7 else 2
+        if part.origin[axis] > own[axis]:
+            high[axis] = part.origin[axis] + 0.006
+            edge = own[axis] - half[axis] - _FREE_EDGE
+            low[axis] = low[axis] if own[axis] - low[axis] < _TO_SIDE else max(edge, low[axis])
+        else:
+            low[axis] = part.origin[axis] - 0.006
+            edge = own[axis] + half[axis] + _FREE_EDGE
+            high[axis] = high[axis] if high[axis] - own[axis] < _TO_SIDE else min(edge, high[axis])
+    low[0], high[0] = front - _PANEL, front
+    return np.stack([low, high])
+
+
+def _between_neighbours(
+    part: _Shut, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """Of the body, what is nearer to a part's handle than to those of others: low and high corner."""
     low, high = bounds[0].copy(), bounds[1].copy()
-    own = part.handle[:3, 3]
-    half = _half_handle(part)
+    own, half = part.handle[:3, 3], _half_handle(part)
     for other in others:
         if other is part or other.sensed.confidence < 0.15:
             continue
@@ -273,17 +353,6 @@ def _panel(
             high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
         else:
             low[axis] = max(low[axis], min(middle, own[axis] - half[axis]))
-    if part.kind == "hinge":
-        axis = 1 if abs(part.axis[2]) > 0.7 else 2
-        if part.origin[axis] > own[axis]:
-            high[axis] = part.origin[axis] + 0.006
-            edge = own[axis] - half[axis] - _FREE_EDGE
-            low[axis] = low[axis] if own[axis] - low[axis] < _TO_SIDE else max(edge, low[axis])
-        else:
-            low[axis] = part.origin[axis] - 0.006
-            edge = own[axis] + half[axis] + _FREE_EDGE
-            high[axis] = high[axis] if high[axis] - own[axis] < _TO_SIDE else min(edge, high[axis])
-    low[0], high[0] = front - _PANEL, front
     return np.stack([low, high])
 
 

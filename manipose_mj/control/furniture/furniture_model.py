@@ -49,6 +49,11 @@ class PartModel:
         return self.part.name
 
     @property
+    def hinged(self) -> bool:
+        """Whether it turns."""
+        return self.part.joint.kind == "hinge"
+
+    @property
     def boxes(self) -> Boxes:
         """All that moves."""
         boxes = [self.panel[None], self.handle]
@@ -101,6 +106,22 @@ class FurnitureModel:
                     boxes, np.array([low, [max(high[0], part.panel[1, 0]), high[1], high[2]]])
                 )
         return boxes
+
+    @property
+    def front(self) -> float:
+        """Where the fronts of shut parts are, along X [m]."""
+        fronts: Float[np.ndarray, "k"] = np.array([part.panel[1, 0] for part in self.parts])
+        return float(np.median(fronts)) if len(fronts) else float(self.solid[:, 1, 0].max())
+
+    def with_another(self, part: PartModel) -> FurnitureModel:
+        """The same with one more part; what had its name is kept under another."""
+        others = [
+            replace(each, part=replace(each.part, name=f"part_{len(self.parts)}"))
+            if each.name == part.name
+            else each
+            for each in self.parts
+        ]
+        return replace(self, parts=(*others, part))
 
     def with_part(self, part: PartModel) -> FurnitureModel:
         """The same with another state of the part of that name."""

@@ -9,11 +9,15 @@ from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.boxes import Boxes
 from manipose_mj.poses import SymmetryGroup, invert, transform
 
+# Rotations of a level and of an upright bar, X along the bar and Y out of the front.
+ACROSS_FRONT = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+UP_FRONT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
 # Of a handle's lengths, to keep clear of: round ones fill no box, and fingers close on them.
 _SOLID = np.array([1.0, 0.8, 0.7])
 _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
+_FACES = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -65,11 +69,13 @@ def _measured(
         middle = middle + handle[:3, 1] * (front_side + panel) / 2
     depth = 0.012 if length > 0.045 else max(front_side - panel, 0.015)
     extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
+    rotation = handle[:3, :3]
     if length <= 0.045:
-        # A knob: as wide one way as the other, down to the panel.
+        # A knob: as wide one way as the other, down to the panel; how it is turned about the way out says nothing.
         side = float(np.clip(max(length, across), 0.014, 0.045))
         extents = np.array([side, depth, side])
-    return PoseLabel(middle, handle[:3, :3], "handle", extents, _TURNS), True
+        rotation = ACROSS_FRONT if handle[0, 1] > _FACES else rotation
+    return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
 
 
 def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:

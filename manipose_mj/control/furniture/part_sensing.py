@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 
+ONE_DOOR = 0.12  # the handle of a part, and the guess at that of a door which its panel showed, are one if nearer [m]
 _LEAST = 0.03  # confidence of what is looked at at all
 _SAME = 0.04  # handles nearer than this are one [m]
 
@@ -91,6 +92,17 @@ def sense_parts(
     ]
     front = turn @ row["body"][:, 0].astype(float)
     return SensedFurniture(_level(front), tuple(_distinct(parts)))
+
+
+def with_open_door(sensed: SensedFurniture, door: SensedPart) -> SensedFurniture:
+    """The same with a door that its panel showed: the joint of a part that has its handle there, or one more part."""
+    apart = [np.linalg.norm(part.handle[:3, 3] - door.handle[:3, 3]) for part in sensed.parts]
+    nearest = int(np.argmin(apart)) if apart else 0
+    if not apart or apart[nearest] > ONE_DOOR:
+        return replace(sensed, parts=(door, *sensed.parts))
+    part = replace(door, handle=sensed.parts[nearest].handle)
+    others = sensed.parts[:nearest] + sensed.parts[nearest + 1 :]
+    return replace(sensed, parts=(part, *others))
 
 
 @dataclass(frozen=True)

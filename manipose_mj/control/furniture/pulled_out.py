@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.furniture_fit import as_drawer
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
+from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, handle_boxes, handle_label
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import compose, invert, transform
 
@@ -23,9 +22,6 @@ _BIN = 0.004  # in which they are counted [m]
 _LEAST, _SMALLEST = 200, 0.05  # points of a front; its sides [m]
 _THICKNESS = 0.018  # [m]
 _HANDLE = 0.03  # of a handle before its front [m]
-_ACROSS = np.array(
-    [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
-)  # a bar along Y, X outwards
 _LOOKS = 500
 
 
@@ -41,7 +37,7 @@ def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> Furniture
     """
     points = transform(invert(model.pose), cloud.points)
     out = cloud.normals @ model.pose[:3, 0] > _FACING
-    front = _body_front(model)
+    front = model.front
     low, high = model.solid[:, 0].min(axis=0) - 0.03, model.solid[:, 1].max(axis=0) + 0.03
     out &= (points[:, 0] > front + _LEAST_OUT) & (points[:, 0] < front + _MOST_OUT)
     out &= ((points > low) & (points < high))[:, 1:].all(axis=1)
@@ -58,7 +54,7 @@ def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> Furniture
     shut = points - [opening, 0.0, 0.0]
     panel = np.column_stack([[front - _THICKNESS, front], ends])
     middle = np.array([front + _HANDLE, *ends.mean(axis=0)])
-    handle, _ = handle_label(shut, compose(_ACROSS, middle), front)
+    handle, _ = handle_label(shut, compose(ACROSS_FRONT, middle), front)
     rows = np.random.default_rng(0).permutation(np.flatnonzero(on))[:_LOOKS]
     joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, 1.0))
     part = PartModel(
@@ -73,16 +69,4 @@ def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> Furniture
     joint = drawer.part.joint
     joint = replace(joint, range=(0.0, max(joint.range[1], opening)))
     drawer = replace(drawer, part=replace(drawer.part, joint=joint), opening=opening)
-    others = [
-        replace(each, part=replace(each.part, name=f"part_{len(model.parts)}"))
-        if each.name == name
-        else each
-        for each in model.parts
-    ]
-    return replace(model, parts=(*others, drawer))
-
-
-def _body_front(model: FurnitureModel) -> float:
-    """Where the fronts of shut parts are, along X [m]."""
-    fronts: Float[np.ndarray, "k"] = np.array([part.panel[1, 0] for part in model.parts])
-    return float(np.median(fronts)) if len(fronts) else float(model.solid[:, 1, 0].max())
+    return model.with_another(drawer)

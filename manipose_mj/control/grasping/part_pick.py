@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.grasping.handle_grasps import GripKind, grip_now, grips
+from manipose_mj.control.grasping.handle_grasps import Grip, GripKind, grip_now, grips
 from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -24,10 +24,11 @@ _AJAR = 0.5  # of a door, enough to reach behind it [rad]
 # A way that ends sooner is worth it where none goes on: the hand takes hold again from there [m or rad].
 _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
+_ALONG_HINGE = 0.9  # cosine between what the hand tilts about and a door's hinge, at least
 _MAX_TRIES = 12  # ways for which an approach is looked for
 # How a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
 _KINDS: tuple[GripKind, ...] = ("usual", "fingertips")
-_KINDS_IN_STAGES: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
+_FIRM_KINDS: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ def grip_handle(
     opening: float | None,
     *,
     in_stages: bool = False,
+    following: bool = False,
 ) -> HandleGrip:
     """A grip of the handle that can be approached and moves the part as far as any, and get off there.
 
@@ -57,6 +59,8 @@ def grip_handle(
       part: What to take.
       opening: Where it shall go [m or rad]; None: nobody knows yet.
       in_stages: Knobs are to be held deeper than usual, even if that leads less far; bars may be held anywhere.
+      following: The same, and rather such that the hand turns with a door: its joint is an estimate, and a knob slips out
+        of fingers that are led beside its way.
 
     Raises:
       StageFailure: None moves it by a fair share of the way.
@@ -66,7 +70,7 @@ def grip_handle(
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways: list[PartWay] = []
-    for kind in _KINDS_IN_STAGES if in_stages else _KINDS:
+    for kind in _FIRM_KINDS if in_stages or following else _KINDS:
         led = (
             find_way(planner, part, hold, opening, near=estimate.joints)
             for hold in grips(part, kind)
@@ -78,7 +82,13 @@ def grip_handle(
         )
         free = (ending_free(planner, part, way) for way in held)
         found = [way for way in free if way is not None]
-        found.sort(key=lambda way: (-round(share_of(way, part, opening), 1), _turned(way)))
+        found.sort(
+            key=lambda way: (
+                -round(share_of(way, part, opening), 1),
+                following and not _turns_along(way, part),
+                _turned(way),
+            )
+        )
         ways += found
         far = [way for way in found if anywhere or leads_enough(way, part, opening)]
         grip = _approached(planner, estimate, part, far)
@@ -179,6 +189,12 @@ def is_a_stage(way: PartWay, part: PartEstimate) -> bool:
 def _turned(way: PartWay) -> float:
     """How much the arm turns on the way, with a price on starting tilted [rad]."""
     return float(np.abs(np.diff(way.joints, axis=0)).max(axis=1).sum() + 0.5 * abs(way.tilts[0]))
+
+
+def _turns_along(way: PartWay, part: PartEstimate) -> bool:
+    """Whether the hand can tilt about the axis that a door turns about; a drawer turns about none."""
+    bar = way.hold.bar[:3, 0] if isinstance(way.hold, Grip) else part.joint.axis
+    return part.joint.kind == "slide" or abs(float(bar @ part.joint.axis)) > _ALONG_HINGE
 
 
 def _can_get_off(

@@ -184,15 +184,16 @@ def pick_part(
     opening: float | None,
     *,
     in_stages: bool = False,
+    following: bool = False,
 ) -> PartPick:
     """A grip of the handle that can be approached and moves the part towards `opening`; None: anywhere.
 
-    `in_stages` as of `grip_handle`.
+    `in_stages` and `following` as of `grip_handle`.
 
     Raises:
       StageFailure: There is none.
     """
-    grip = grip_handle(planner, estimate, part, opening, in_stages=in_stages)
+    grip = grip_handle(planner, estimate, part, opening, in_stages=in_stages, following=following)
     return PartPick(grip.free_path, grip.approach, grip.width, grip.opening, grip.approach[-1])
 
 

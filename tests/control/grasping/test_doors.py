@@ -113,6 +113,21 @@ def test_knobs_are_held_deeper_in_stages_than_usual(scene):
     assert not list(grips(part, "deep"))
 
 
+def test_a_knob_that_is_followed_is_held_such_that_the_hand_turns_with_the_door():
+    environment = load(
+        "articulated", "open_cabinet_door", seed=2, objects="cabinet_009", obs_mode="state"
+    )
+    environment.reset()
+    baseline = Baseline(environment)
+    estimate = baseline.perception.observe()
+    planner = MotionPlanner(estimate.scene, baseline.arm, 0.02, np.random.default_rng(0))
+    part = estimate.parts[environment.task.part.name]
+    assert part.handle.extents[0] < 0.04
+    grip = grip_handle(planner, estimate, part, part.joint.range[1], following=True)
+    hinge = part.base_pose[:3, :3] @ part.joint.axis
+    assert abs(planner.tcp_pose(grip.approach[-1])[:3, 0] @ hinge) > 0.9
+
+
 def test_a_long_bar_may_be_held_away_from_its_middle_where_there_is_any_of_it(scene, monkeypatch):
     planner, estimate, part = scene
     along = [hold.upright[0, 3] for hold in grips(part, "aside")]
@@ -130,7 +145,7 @@ def test_a_long_bar_may_be_held_away_from_its_middle_where_there_is_any_of_it(sc
     before = replace(ways[0], joints=np.repeat(away, len(ways[0].joints), axis=0))
     assert not _closes_on(planner, part, before)
     # The middle will not do: the grip is one of these.
-    monkeypatch.setattr(part_pick, "_KINDS_IN_STAGES", ("aside",))
+    monkeypatch.setattr(part_pick, "_FIRM_KINDS", ("aside",))
     grip = grip_handle(planner, estimate, part, part.joint.range[1], in_stages=True)
     tcp = invert(part.handle_pose) @ planner.tcp_pose(grip.approach[-1])
     assert min(abs(abs(tcp[0, 3]) - abs(slide)) for slide in along) < 2e-3
@@ -249,7 +264,7 @@ def test_in_stages_a_door_without_a_grip_is_pushed_on_from_inside(monkeypatch):
     """Led ajar it can be gripped no more: the plan's next push goes on from there."""
     gripped = []
 
-    def pick(*arguments, in_stages: bool):
+    def pick(*arguments, in_stages: bool, following: bool):
         gripped.append(in_stages)
         return pick_part(*arguments) if len(gripped) == 1 else _refuse()
 

@@ -1,0 +1,58 @@
+"""Where a door's hinge is likely to be, from its handle and panel, when the estimated axis cannot be one."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+# Of what has knobs that turn about the way out of the front; parts of other categories are doors if they turn.
+WITH_KNOBS = frozenset({"dishwasher", "microwave", "oven", "washing_machine"})
+_STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at least
+# Of the handle of a flap: how far from the middle at most, across, and at least, upright, of the panel's half.
+_ACROSS, _UPRIGHT = 0.3, 0.5
+_CORNER = 0.6  # across: beyond it no flap has its handle
+
+
+def can_be_a_door(
+    axis: Float[np.ndarray, "3"],
+    handle: Float[np.ndarray, "4 4"],
+    panel: Float[np.ndarray, "2 3"],
+) -> bool:
+    """Whether a hinge's axis is upright in the front, or nearly so, or level with the handle in the middle.
+
+    All in the object frame, as of `likely_hinge`.
+    """
+    if abs(axis[1]) > _STRAIGHT:
+        return abs(float(_away(handle, panel)[1])) < _CORNER
+    return abs(float(axis[2])) > _STRAIGHT
+
+
+def likely_hinge(
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """A point of the axis and its direction, positive is opening: along the edge that is farthest from the handle.
+
+    Doors turn about the vertical. A flap, whose handle lies level in the middle of an upper or lower edge, turns about
+    the level.
+
+    Args:
+      handle: `T_object_handle`, shut.
+      panel: Low and high corner, object frame, between its neighbours and the body's sides [m].
+    """
+    along, away = np.abs(handle[:3, 0]), _away(handle, panel)
+    middle, half = panel.mean(axis=0), np.ptp(panel, axis=0) / 2
+    level = along[1] > along[2] and abs(away[1]) < _ACROSS and abs(away[2]) > _UPRIGHT
+    across = 2 if level else 1
+    side = -1.0 if away[across] > 0 else 1.0
+    origin = np.array([panel[1, 0], middle[1], middle[2]])
+    origin[across] = middle[across] + side * half[across]
+    axis = np.zeros(3)
+    axis[1 if level else 2] = -side if level else side
+    return origin, axis
+
+
+def _away(
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "3"]:
+    """From the panel's middle to the handle, in halves of the panel."""
+    return (handle[:3, 3] - panel.mean(axis=0)) / np.maximum(np.ptp(panel, axis=0) / 2, 1e-3)

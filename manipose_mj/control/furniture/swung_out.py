@@ -1,0 +1,256 @@
+"""A door that stands open: its panel stands out of the body, and its hinge is where that meets the front."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
+from manipose_mj.control.furniture.part_sensing import SensedPart
+from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.poses import compose, invert, rotation_about, transform
+
+_LEAST_OUT = 0.06  # how far a door stands out of the body: handles stand out less [m]
+_ALONG = 0.4  # cosine between normals of a door and its hinge, at most
+_PLANE = 0.012  # how far points of a door are from its plane [m]
+_LEAST, _SMALLEST = 200, 0.08  # points of a door; its sides [m]
+_AJAR, _WIDEST = 0.5, 2.6  # openings at which a door stands out [rad]
+# Between the faces of a door [m]: where one alone shows, at least, at most.
+_THICKNESS, _THINNEST, _THICKEST = 0.018, 0.008, 0.05
+_ONE_FACE = 0.006  # how far points of a face are from it [m]
+_FACES = 0.7  # cosine between their normals and the face's, at least
+_BEHIND = (0.03, 0.3)  # how far behind the front the sides of the body are looked for [m]
+# Of the front of the body: cosine of its normals and X, at least; how far it may be from where it is thought to be, bins in
+# which its points are counted [m], and their share of the fullest bin's.
+_FRONT_FACES, _MISTAKEN, _BIN, _SHARE = 0.9, 0.08, 0.005, 0.3
+_EDGE = 0.06  # how far hinges are from a side of the body [m]
+_GAP = 0.08  # how far from its hinge a door begins to show, at most [m]
+_HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
+_HANDLE_LEAST = 30  # such points
+_FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
+_TRIES = 200
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A door as seen along its hinge. Attributes: middle, a point; way, out of the body; both along X and across `(2,)`;
+    inwards: sign of the way from hinge to free edge, across, of the shut door."""
+
+    middle: Float[np.ndarray, "2"]
+    way: Float[np.ndarray, "2"]
+    inwards: float = 1.0
+
+    @property
+    def outwards(self) -> Float[np.ndarray, "2"]:
+        """Normal of the face that is the front's when the door is shut."""
+        return self.inwards * np.array([self.way[1], -self.way[0]])
+
+    @property
+    def opening(self) -> float:
+        """Of the door [rad]."""
+        return float(np.arctan2(self.way[0], self.way[1] * self.inwards))
+
+    def before(self, flat: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n"]:
+        """How far points are before the line, outwards [m]."""
+        return (flat - self.middle) @ self.outwards
+
+    def moved(self, outwards: float) -> _Line:
+        """The same, further outwards [m]."""
+        return _Line(self.middle + outwards * self.outwards, self.way, self.inwards)
+
+    def across_at(self, x: float) -> float:
+        """Where it is at a place along X [m]."""
+        return float(self.middle[1] + self.way[1] / self.way[0] * (x - self.middle[0]))
+
+
+@dataclass(frozen=True)
+class _Swung:
+    """Attributes: on: points of the door; across: axis of the object frame from hinge to free edge, shut; line: its outer
+    face; hinge: along X and across `(2,)` [m]; thickness [m]."""
+
+    on: Bool[np.ndarray, "n"]
+    across: int
+    line: _Line
+    hinge: Float[np.ndarray, "2"]
+    thickness: float
+
+
+def swung_out(model: FurnitureModel, cloud: SceneCloud) -> SensedPart | None:
+    """A door whose panel stands out of the body's edge; None where none does.
+
+    Args:
+      model: Of the furniture, its front about right.
+      cloud: Of it, with normals.
+    """
+    points = transform(invert(model.pose), cloud.points)
+    normals = cloud.normals @ model.pose[:3, :3]
+    # Doors turn about the vertical, flaps about the level.
+    found = [_swung(points, normals, model.front, across) for across in (1, 2)]
+    swung = max(
+        (each for each in found if each is not None), key=lambda each: each.on.sum(), default=None
+    )
+    if swung is None:
+        return None
+    inwards, opening = swung.line.inwards, swung.line.opening
+    axis, origin = np.zeros(3), np.zeros(3)
+    axis[3 - swung.across] = inwards if swung.across == 2 else -inwards
+    origin[[0, swung.across]] = swung.hinge
+    turn = rotation_about(axis, opening)
+    motion = compose(turn, origin - turn @ origin)
+    shut = transform(invert(motion), points)
+    return SensedPart(
+        handle=model.pose @ motion @ _handle_guess(shut, swung),
+        kind="hinge",
+        origin=transform(model.pose, origin[None])[0],
+        axis=model.pose[:3, :3] @ axis,
+        opening=opening,
+        confidence=1.0,
+    )
+
+
+def as_seen_open(part: PartModel, door: SensedPart, pose: Float[np.ndarray, "4 4"]) -> PartModel:
+    """A door with the hinge and opening that its panel shows; `pose` is `T_world_object`."""
+    to_object = invert(pose)
+    joint = replace(
+        part.part.joint,
+        origin=transform(to_object, door.origin[None])[0],
+        axis=to_object[:3, :3] @ door.axis,
+    )
+    low, high = joint.range
+    joint = replace(joint, range=(low, max(high, door.opening)))
+    return replace(part, part=replace(part.part, joint=joint), opening=door.opening)
+
+
+def _swung(
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    front: float,
+    across: int,
+) -> _Swung | None:
+    """A door about the axis that neither X nor `across` is: a line of points, seen along that axis."""
+    out = (points[:, 0] > front + _LEAST_OUT) & (np.abs(normals[:, 3 - across]) < _ALONG)
+    flat, faces = points[:, [0, across]], normals[:, [0, across]]
+    line = _line(flat[out]) if out.sum() >= _LEAST else None
+    if line is None:
+        return None
+    rest = np.abs(line.before(flat)) > 2 * _PLANE
+    facing = points[rest & (normals[:, 0] > _FRONT_FACES), 0]
+    front = _foremost(facing, front)
+    body = (points[:, 0] < front - _BEHIND[0]) & (points[:, 0] > front - _BEHIND[1])
+    if body.sum() < _LEAST:
+        return None
+    sides = np.percentile(points[body, across], [1, 99])
+    line = replace(line, inwards=_inwards(line, flat[out], front, sides, across))
+    line, thickness = _outer_face(line, flat[out], faces[out])
+    # Most hinges are at the inner face; that is where the body's rim is, if not where its front is.
+    rim = np.abs(facing - (front - thickness)) < 2 * _BIN
+    inner = line.moved(-thickness)
+    x = front - thickness if rim.sum() > _LEAST else front
+    hinge = np.array([x, inner.across_at(x)])
+    before = line.before(flat)
+    on = (before < _PLANE) & (before > -thickness - _PLANE) & (points[:, 0] > front)
+    if not on.any() or not _AJAR < line.opening < _WIDEST:
+        return None
+    begins = float(np.percentile((flat[on] - hinge) @ line.way, 1))
+    upright = float(np.ptp(np.percentile(points[on, 3 - across], [1, 99])))
+    # Doors turn about a side of the body; below a flap there may be more of it.
+    beside = across == 1 and np.abs(sides - hinge[1]).min() > _EDGE
+    if beside or begins > _GAP or upright < _SMALLEST:
+        return None
+    return _Swung(on, across, line, hinge, thickness)
+
+
+def _inwards(
+    line: _Line,
+    flat: Float[np.ndarray, "n 2"],
+    front: float,
+    sides: Float[np.ndarray, "2"],
+    across: int,
+) -> float:
+    """Sign of the way from the hinge of a door to its free edge, shut: away from the nearer side of the body.
+
+    A flap shuts upwards, where there is room for it.
+    """
+    hinge = line.across_at(front)
+    if across == 1:
+        return 1.0 if abs(sides[0] - hinge) < abs(sides[1] - hinge) else -1.0
+    length = float(np.percentile((flat - [front, hinge]) @ line.way, 99))
+    return 1.0 if hinge + length < sides[1] + _EDGE else -1.0
+
+
+def _line(flat: Float[np.ndarray, "n 2"]) -> _Line | None:
+    """The line that most points are on; None where they are too few, or it does not lead out of the body."""
+    rng = np.random.default_rng(0)
+    first, second = flat[rng.integers(len(flat), size=(2, _TRIES))]
+    ways = second - first
+    lengths = np.linalg.norm(ways, axis=1)
+    long = lengths > _SMALLEST / 2
+    if not long.any():
+        return None
+    first, ways = first[long], ways[long] / lengths[long, None]
+    sides = np.column_stack([-ways[:, 1], ways[:, 0]])
+    some = flat[rng.integers(len(flat), size=min(len(flat), 2000))]
+    beside = np.abs(np.einsum("kni,ki->kn", some[None] - first[:, None], sides))
+    best = int((beside < _ONE_FACE).sum(axis=1).argmax())
+    on = flat[np.abs((flat - first[best]) @ sides[best]) < _PLANE]
+    middle = on.mean(axis=0)
+    way = np.linalg.svd(on - middle, full_matrices=False)[2][0]
+    leads_out = len(on) >= _LEAST and abs(way[0]) > 1e-3
+    return _Line(middle, way * np.sign(way[0])) if leads_out else None
+
+
+def _outer_face(
+    line: _Line, flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"]
+) -> tuple[_Line, float]:
+    """The line of the outer face, and how far behind it the inner one is [m]: each of them may be all that shows."""
+    near = np.abs(line.before(flat)) < _THICKEST
+    flat, faces = flat[near], faces[near]
+    outer, inner = (sign * (faces @ line.outwards) > _FACES for sign in (1.0, -1.0))
+    shown, sign = (outer, 1.0) if outer.sum() >= _LEAST else (inner, -1.0)
+    if shown.sum() < _LEAST:
+        return line, _THICKNESS
+    off = line.before(flat[shown])
+    on_face = np.abs(off - np.median(off)) < _ONE_FACE
+    # Its normals tell better than its points how it is turned: frames stand before panes.
+    normal = sign * np.median(faces[shown][on_face], axis=0)
+    way = line.inwards * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
+    line = replace(line, middle=flat[shown][on_face].mean(axis=0), way=way)
+    outer, inner = flat[outer], flat[inner]
+    if len(outer) < _LEAST:
+        return line.moved(_THICKNESS), _THICKNESS
+    if len(inner) < _LEAST:
+        return line, _THICKNESS
+    # A frame around a pane is as thick as the door.
+    behind = float(-np.percentile(line.before(inner), 10))
+    return line, float(np.clip(behind, _THINNEST, _THICKEST))
+
+
+def _foremost(facing: Float[np.ndarray, "n"], about: float) -> float:
+    """The foremost of the places along X where much faces out of the front, about where that is thought to be [m]."""
+    near = facing[np.abs(facing - about) < _MISTAKEN]
+    edges = np.arange(about - _MISTAKEN, about + _MISTAKEN + _BIN, _BIN)
+    counts = np.convolve(np.histogram(near, edges)[0], np.ones(2), mode="same")
+    many = np.flatnonzero(counts > max(_LEAST, _SHARE * counts.max()))
+    if not len(many):
+        return about
+    place = edges[many[-1]]
+    return float(np.median(near[np.abs(near - place) < 2 * _BIN]))
+
+
+def _handle_guess(shut: Float[np.ndarray, "n 3"], swung: _Swung) -> Float[np.ndarray, "4 4"]:
+    """`T_object_handle`, about where points stand out of the panel, or else near its free edge; X along the hinge."""
+    panel = np.percentile(shut[swung.on], [1, 99], axis=0)
+    front = float(swung.hinge[0]) + swung.thickness
+    out = shut[:, 0] - front
+    on = (out > _HANDLE[0]) & (out < _HANDLE[1])
+    on &= ((shut > panel[0]) & (shut < panel[1]))[:, 1:].all(axis=1)
+    place = panel.mean(axis=0)
+    near, far = panel[:, swung.across] if swung.line.inwards > 0 else panel[::-1, swung.across]
+    place[swung.across] = near + _FREE * (far - near)
+    if on.sum() > _HANDLE_LEAST:
+        place = np.median(shut[on], axis=0)
+    place[0] = front + 0.03
+    return compose(ACROSS_FRONT if swung.across == 2 else UP_FRONT, place)

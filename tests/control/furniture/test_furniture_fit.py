@@ -1,0 +1,78 @@
+"""What is made of parts that were sensed not quite right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipose_mj.control.furniture.furniture_fit import fit_furniture
+from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
+from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.poses import compose, rotation_about
+from tests.control.furniture.synthetic import FRONT, HALF, body, cloud, door, rectangle
+
+X, Y, Z = np.eye(3)
+
+
+def sensed(kind: str, place: list[float], **changed) -> SensedPart:
+    """A shut part with its handle there, an upright bar."""
+    handle = compose(UP_FRONT, np.array(place))
+    usual = {"origin": handle[:3, 3], "axis": X, "opening": 0.0, "confidence": 0.5}
+    return SensedPart(**{"handle": handle, "kind": kind, **usual, **changed})
+
+
+@pytest.mark.parametrize("thought", [1.5, 1.9])
+def test_an_open_door_faces_where_its_panel_does(thought):
+    """And so does its handle, which was taken to be as far open as was thought."""
+    opening, origin = 1.7, np.array([FRONT, -HALF, 0.0])
+    shut = np.array([FRONT + 0.05, -0.15 * HALF, 0.25])
+    handle = rotation_about(-Z, opening) @ (shut - origin) + origin
+    part = sensed(
+        "hinge",
+        [0, 0, 0],
+        handle=compose(rotation_about(-Z, thought) @ UP_FRONT, handle),
+        origin=origin,
+        axis=-Z,
+        opening=thought,
+    )
+    model = fit_furniture(
+        cloud(body() + door(-HALF, opening, "outer inner")), SensedFurniture(X, (part,)), "cabinet"
+    )
+    assert model.parts[0].opening == pytest.approx(opening, abs=0.01)
+    label = model.parts[0].part.handle
+    assert label is not None
+    np.testing.assert_allclose(label.rotation, UP_FRONT, atol=1e-6)
+
+
+@pytest.mark.parametrize(("category", "turns"), [("cabinet", Z), ("oven", X)])
+def test_where_nothing_has_knobs_what_turns_like_one_is_a_door(category, turns):
+    parts = (sensed("hinge", [FRONT + 0.03, 0.05, 0.2]), sensed("slide", [FRONT + 0.03, -0.1, 0.2]))
+    model = fit_furniture(cloud(body()), SensedFurniture(X, parts), category)
+    axes = [np.abs(part.part.joint.axis) for part in model.parts if part.hinged]
+    assert len(axes) == 1
+    np.testing.assert_allclose(axes[0], turns, atol=1e-6)
+
+
+def test_two_handles_do_not_take_up_one_place_though_their_drawers_are_open_by_different_ways():
+    out = rectangle(np.array([FRONT + 0.25, -0.2, 0.2]), 0.4 * Y, 0.15 * Z, X)
+    knob = rectangle(np.array([FRONT + 0.28, -0.015, 0.26]), 0.03 * Y, 0.03 * Z, X)
+    place = [FRONT + 0.28, 0.0, 0.275]
+    sure = sensed("slide", place, opening=0.25, confidence=0.6)
+    other = sensed("slide", [*place[:2], 0.26], opening=0.19, confidence=0.2)
+    below = sensed("slide", [FRONT + 0.03, 0.0, 0.05], confidence=0.5)
+    model = fit_furniture(
+        cloud([*body(), out, knob]), SensedFurniture(X, (sure, other, below)), "cabinet"
+    )
+    assert sorted(part.confidence > 0.21 for part in model.parts) == [False, True]
+
+
+def test_how_a_knob_is_turned_says_nothing():
+    points, _ = rectangle(np.array([FRONT + 0.03, -0.012, 0.19]), 0.024 * Y, 0.024 * Z, X)
+    askew = compose(rotation_about(X, 0.8) @ ACROSS_FRONT, np.array([FRONT + 0.03, 0.0, 0.2]))
+    fine = np.repeat(points, 4, axis=0) + np.random.default_rng(1).normal(
+        0, 1e-3, (4 * len(points), 3)
+    )
+    label, seen = handle_label(fine, askew, FRONT)
+    assert seen
+    assert label.extents[0] < 0.045
+    np.testing.assert_allclose(label.rotation, ACROSS_FRONT)
