@@ -10,21 +10,25 @@ WITH_KNOBS = frozenset({"dishwasher", "microwave", "oven", "washing_machine"})
 _STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at least
 # Of the handle of a flap: how far from the middle at most, across, and at least, upright, of the panel's half.
 _ACROSS, _UPRIGHT = 0.3, 0.5
+_AT_EDGE = 0.25  # how far from an edge of the panel an upright hinge may be, of the panel's width
 _CORNER = 0.6  # across: beyond it no flap has its handle
 
 
 def can_be_a_door(
+    origin: Float[np.ndarray, "3"],
     axis: Float[np.ndarray, "3"],
     handle: Float[np.ndarray, "4 4"],
     panel: Float[np.ndarray, "2 3"],
 ) -> bool:
-    """Whether a hinge's axis is upright in the front, or nearly so, or level with the handle in the middle.
+    """Whether a hinge is upright near an edge of the panel, or level with the handle in the middle.
 
     All in the object frame, as of `likely_hinge`.
     """
     if abs(axis[1]) > _STRAIGHT:
         return abs(float(_away(handle, panel)[1])) < _CORNER
-    return abs(float(axis[2])) > _STRAIGHT
+    width = float(np.ptp(panel[:, 1]))
+    at_edge = float(np.abs(panel[:, 1] - origin[1]).min()) < _AT_EDGE * width
+    return abs(float(axis[2])) > _STRAIGHT and at_edge
 
 
 def likely_hinge(

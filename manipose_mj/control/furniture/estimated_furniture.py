@@ -17,29 +17,29 @@ from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartMo
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import found_opening
-from manipose_mj.control.furniture.part_sensing import (
-    ONE_DOOR,
-    PartSensor,
-    SensedFurniture,
-    SensedPart,
-    with_open_door,
-)
+from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
 from manipose_mj.control.furniture.pulled_out import pulled_out
 from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
-from manipose_mj.control.furniture.stops import Stops
-from manipose_mj.control.furniture.swung_out import as_seen_open, swung_out
+from manipose_mj.control.furniture.stops import Stops, Swings
+from manipose_mj.control.furniture.swung_out import (
+    OpenDoor,
+    as_seen_open,
+    swung_out,
+    with_open_door,
+)
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
-from manipose_mj.tasks.goals import ShutGoal
+from manipose_mj.tasks.goals import OpenGoal, ShutGoal
 from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
 _SURE_PART = 0.15  # confidence of parts that nobody asked for
 _LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
+_BEYOND = 0.05  # the usual range of a door, from which on nobody knows how far it opens [rad]
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 
@@ -79,7 +79,7 @@ class EstimatedFurniture:
         self._mask = 0
         self._held: _Held | None = None
         self._moved: set[str] = set()
-        self._stops = Stops()
+        self._stops, self._swings = Stops(), Swings()
         # Hinges that an open panel or a long arc of the hand has shown.
         self._sure: dict[str, Joint] = {}
         self._before: dict[
@@ -93,7 +93,8 @@ class EstimatedFurniture:
           StageFailure: No part is found that a goal could mean.
         """
         self.model, self._held, self._moved = None, None, set()
-        self._before, self._sure, self._stops = {}, {}, Stops()
+        self._before, self._sure = {}, {}
+        self._stops, self._swings = Stops(), Swings()
         for category, mask in self._task.furniture_masks:
             self._mask = mask
             seen = self._cloud(self._front_cameras)
@@ -187,6 +188,7 @@ class EstimatedFurniture:
                 geoms=geoms[part.name],
                 bodies_inside=_inside(model, part, objects),
                 cavity_seen=part.seen_inside,
+                goes_on=self._swings.goes_on(part.name),
             )
             for part in model.parts
         }
@@ -220,7 +222,11 @@ class EstimatedFurniture:
             for part in touched:
                 before = self._before.pop(part.name, None)
                 opening = found_opening(part, points, hidden, before)
-                self.model = self.model.with_part(part.at(opening)) if self.model else None
+                known = part.part.joint.range[1]
+                if self._shall_open_wide(part):
+                    known = self._swings.end(part.name, opening, known)
+                part = part.at(opening).opening_to(known)
+                self.model = self.model.with_part(part) if self.model else None
         self._moved = {
             part.name for part in touched if self._near(part, tcp_pose)
         }  # looked at again until the hand is gone
@@ -250,7 +256,10 @@ class EstimatedFurniture:
             self._before[name] = started  # a hand that slips goes on without the part
         low, high = part.part.joint.range
         ends = stopped and self._stops.is_end(name, joint.kind, opening, high)
-        joint = replace(joint, range=(low, opening if ends else max(high, opening)))
+        end = opening if ends else max(high, opening)
+        if not stopped and opening > high + _BEYOND and self._shall_open_wide(part):
+            end = self._swings.led(name, opening, high)
+        joint = replace(joint, range=(low, end))
         moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
         # Where the hand would be were the part shut, by the joint as it is known now.
         back = invert(moved.motion(opening))
@@ -262,6 +271,7 @@ class EstimatedFurniture:
         part = self._part(name)
         if part is not None and self.model is not None:
             self._before[name] = part.opening
+            self._swings.pushed(name, opening)
             self.model = self.model.with_part(part.at(max(opening, 0.0)))
             self._moved.add(name)
 
@@ -284,11 +294,18 @@ class EstimatedFurniture:
                 model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
         self.model = model
 
-    def _is_of(self, door: SensedPart, part: PartModel) -> bool:
-        """Whether a door that stands open is this part: its handle is near where that of the part is."""
+    def _shall_open_wide(self, part: PartModel) -> bool:
+        """Whether it is a door that shall be open as far as it goes."""
+        goals = self._task.goals
+        return part.hinged and any(
+            isinstance(goal, OpenGoal) and goal.part == part.name for goal in goals
+        )
+
+    def _is_of(self, door: OpenDoor, part: PartModel) -> bool:
+        """Whether a door that stands open is this part: it carries its handle."""
         assert self.model is not None
         handle = self.model.pose @ part.motion(part.opening) @ _handle(part).pose
-        return float(np.linalg.norm(handle[:3, 3] - door.handle[:3, 3])) < ONE_DOOR
+        return door.carries(handle[:3, 3])
 
     def _part(self, name: str | None) -> PartModel | None:
         parts = () if self.model is None else self.model.parts

@@ -37,6 +37,7 @@ _TO_SIDE = 0.09  # a side of the body that is no further from the handle is the 
 _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 # How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
+_KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
 _UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
 _MEET = 0.01  # handles nearer than this are one [m]
@@ -142,16 +143,16 @@ class _Shut:
         self.back = back
 
     def turn_as_doors_do(self, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"]) -> None:
-        """Where the estimated axis is no door's, turn about the likely edge."""
-        if self.kind == "slide":
+        """Where the estimated hinge is no door's, turn about the likely edge."""
+        # What shows open is a door; where its handle is, shut, tells others little.
+        if self.kind == "slide" or (self.opening > 0.0 and abs(self.axis[0]) < _KNOBS):
             return
-        between = _between_neighbours(self, others, bounds)
-        if can_be_a_door(self.axis, self.handle, between):
-            return
-        self.handle = invert(self.back) @ self.handle
-        self.opening, self.back = 0.0, np.eye(4)
-        between = _between_neighbours(self, others, bounds)
-        self.origin, self.axis = likely_hinge(self.handle, between)
+        shut = [other for other in others if other.opening == 0.0 or other.kind == "slide"]
+        between = _between_neighbours(self, shut, bounds)
+        if not can_be_a_door(self.origin, self.axis, self.handle, between):
+            self.handle = invert(self.back) @ self.handle
+            self.opening, self.back = 0.0, np.eye(4)
+            self.origin, self.axis = likely_hinge(self.handle, between)
 
     def meet_front(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float
@@ -287,7 +288,7 @@ def _part(
         panel=panel,
         handle=handle_boxes(handle, front),
         opening=part.opening,
-        confidence=part.sensed.confidence * (1.0 if seen else _UNSEEN),
+        confidence=part.sensed.confidence * (1.0 if seen or part.sensed.certain else _UNSEEN),
         looks=moved[rows],
     )
 

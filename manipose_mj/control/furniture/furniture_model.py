@@ -74,6 +74,11 @@ class PartModel:
         """The same, as far open [m or rad]."""
         return replace(self, opening=opening)
 
+    def opening_to(self, most: float) -> PartModel:
+        """The same, taken to open so far [m or rad]."""
+        joint = replace(self.part.joint, range=(self.part.joint.range[0], most))
+        return replace(self, part=replace(self.part, joint=joint))
+
 
 @dataclass(frozen=True)
 class FurnitureModel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -12,7 +12,6 @@ from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 
-ONE_DOOR = 0.12  # the handle of a part, and the guess at that of a door which its panel showed, are one if nearer [m]
 _LEAST = 0.03  # confidence of what is looked at at all
 _SAME = 0.04  # handles nearer than this are one [m]
 
@@ -27,7 +26,7 @@ class SensedPart:
       origin: `(3,)`, on the joint's axis, world frame [m].
       axis: `(3,)`, unit; positive is opening, world frame.
       opening: [m or rad].
-      confidence: Of the estimator.
+      confidence: Of the estimator; 1 of what is certain.
     """
 
     handle: Float[np.ndarray, "4 4"]
@@ -36,6 +35,11 @@ class SensedPart:
     axis: Float[np.ndarray, "3"]
     opening: float
     confidence: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether it was seen itself, its handle or not."""
+        return self.confidence >= 1.0
 
 
 @dataclass(frozen=True)
@@ -92,17 +96,6 @@ def sense_parts(
     ]
     front = turn @ row["body"][:, 0].astype(float)
     return SensedFurniture(_level(front), tuple(_distinct(parts)))
-
-
-def with_open_door(sensed: SensedFurniture, door: SensedPart) -> SensedFurniture:
-    """The same with a door that its panel showed: the joint of a part that has its handle there, or one more part."""
-    apart = [np.linalg.norm(part.handle[:3, 3] - door.handle[:3, 3]) for part in sensed.parts]
-    nearest = int(np.argmin(apart)) if apart else 0
-    if not apart or apart[nearest] > ONE_DOOR:
-        return replace(sensed, parts=(door, *sensed.parts))
-    part = replace(door, handle=sensed.parts[nearest].handle)
-    others = sensed.parts[:nearest] + sensed.parts[nearest + 1 :]
-    return replace(sensed, parts=(part, *others))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
-from manipose_mj.control.furniture.part_sensing import SensedPart
+from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import compose, invert, rotation_about, transform
 
@@ -17,19 +17,20 @@ _LEAST_OUT = 0.06  # how far a door stands out of the body: handles stand out le
 _ALONG = 0.4  # cosine between normals of a door and its hinge, at most
 _PLANE = 0.012  # how far points of a door are from its plane [m]
 _LEAST, _SMALLEST = 200, 0.08  # points of a door; its sides [m]
-_AJAR, _WIDEST = 0.5, 2.6  # openings at which a door stands out [rad]
+_AJAR, _WIDEST = 0.5, 2.9  # openings at which a door stands out [rad]
 # Between the faces of a door [m]: where one alone shows, at least, at most.
 _THICKNESS, _THINNEST, _THICKEST = 0.018, 0.008, 0.05
 _ONE_FACE = 0.006  # how far points of a face are from it [m]
 _FACES = 0.7  # cosine between their normals and the face's, at least
 _BEHIND = (0.03, 0.3)  # how far behind the front the sides of the body are looked for [m]
 # Of the front of the body: cosine of its normals and X, at least; how far it may be from where it is thought to be, bins in
-# which its points are counted [m], and their share of the fullest bin's.
-_FRONT_FACES, _MISTAKEN, _BIN, _SHARE = 0.9, 0.08, 0.005, 0.3
+# which its points are counted [m], their share of the fullest bin's, and how many there are.
+_FRONT_FACES, _MISTAKEN, _BIN, _SHARE, _FEWEST = 0.9, 0.2, 0.005, 0.3, 60
 _EDGE = 0.06  # how far hinges are from a side of the body [m]
 _GAP = 0.08  # how far from its hinge a door begins to show, at most [m]
 _HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
 _HANDLE_LEAST = 30  # such points
+_BESIDE, _BEHIND_PANEL = 0.03, 0.06  # how far beside and behind it estimates have handles [m]
 _FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
 _TRIES = 200
 
@@ -78,7 +79,33 @@ class _Swung:
     thickness: float
 
 
-def swung_out(model: FurnitureModel, cloud: SceneCloud) -> SensedPart | None:
+@dataclass(frozen=True)
+class OpenDoor:
+    """A door that its panel showed.
+
+    Attributes:
+      sensed: Where it is and how it turns.
+      panel: Low and high corner, shut, object frame [m].
+      back: `T_object_world`, which shuts it.
+      handle_seen: Whether points stand out of the panel where the handle is, otherwise a guess.
+    """
+
+    sensed: SensedPart
+    panel: Float[np.ndarray, "2 3"]
+    back: Float[np.ndarray, "4 4"]
+    handle_seen: bool
+
+    def carries(self, place: Float[np.ndarray, "3"]) -> bool:
+        """Whether a place, world frame [m], is on its front, as a handle is."""
+        local = transform(self.back, place[None])[0]
+        low, high = self.panel - [
+            [_BEHIND_PANEL, _BESIDE, _BESIDE],
+            [-_HANDLE[1], -_BESIDE, -_BESIDE],
+        ]
+        return bool(((local > low) & (local < high)).all())
+
+
+def swung_out(model: FurnitureModel, cloud: SceneCloud) -> OpenDoor | None:
     """A door whose panel stands out of the body's edge; None where none does.
 
     Args:
@@ -101,27 +128,40 @@ def swung_out(model: FurnitureModel, cloud: SceneCloud) -> SensedPart | None:
     turn = rotation_about(axis, opening)
     motion = compose(turn, origin - turn @ origin)
     shut = transform(invert(motion), points)
-    return SensedPart(
-        handle=model.pose @ motion @ _handle_guess(shut, swung),
+    panel = np.percentile(shut[swung.on], [1, 99], axis=0)
+    panel[1, 0] = swung.hinge[0] + swung.thickness
+    handle, seen = _handle_guess(shut, panel, swung)
+    sensed = SensedPart(
+        handle=model.pose @ motion @ handle,
         kind="hinge",
         origin=transform(model.pose, origin[None])[0],
         axis=model.pose[:3, :3] @ axis,
         opening=opening,
         confidence=1.0,
     )
+    return OpenDoor(sensed, panel, invert(model.pose @ motion), seen)
 
 
-def as_seen_open(part: PartModel, door: SensedPart, pose: Float[np.ndarray, "4 4"]) -> PartModel:
+def with_open_door(sensed: SensedFurniture, door: OpenDoor) -> SensedFurniture:
+    """The same with this door instead of all that was sensed on it; of that, its handle where no better one shows."""
+    on = [part for part in sensed.parts if door.carries(part.handle[:3, 3])]
+    others = tuple(part for part in sensed.parts if not door.carries(part.handle[:3, 3]))
+    part = door.sensed
+    if on and not door.handle_seen:
+        part = replace(part, handle=max(on, key=lambda each: each.confidence).handle)
+    return replace(sensed, parts=(part, *others))
+
+
+def as_seen_open(part: PartModel, door: OpenDoor, pose: Float[np.ndarray, "4 4"]) -> PartModel:
     """A door with the hinge and opening that its panel shows; `pose` is `T_world_object`."""
-    to_object = invert(pose)
+    to_object, sensed = invert(pose), door.sensed
     joint = replace(
         part.part.joint,
-        origin=transform(to_object, door.origin[None])[0],
-        axis=to_object[:3, :3] @ door.axis,
+        origin=transform(to_object, sensed.origin[None])[0],
+        axis=to_object[:3, :3] @ sensed.axis,
     )
-    low, high = joint.range
-    joint = replace(joint, range=(low, max(high, door.opening)))
-    return replace(part, part=replace(part.part, joint=joint), opening=door.opening)
+    moved = replace(part, part=replace(part.part, joint=joint), opening=sensed.opening)
+    return moved.opening_to(max(joint.range[1], sensed.opening))
 
 
 def _swung(
@@ -156,9 +196,8 @@ def _swung(
         return None
     begins = float(np.percentile((flat[on] - hinge) @ line.way, 1))
     upright = float(np.ptp(np.percentile(points[on, 3 - across], [1, 99])))
-    # Doors turn about a side of the body; below a flap there may be more of it.
-    beside = across == 1 and np.abs(sides - hinge[1]).min() > _EDGE
-    if beside or begins > _GAP or upright < _SMALLEST:
+    inside = sides[0] - _EDGE < hinge[1] < sides[1] + _EDGE
+    if not inside or begins > _GAP or upright < _SMALLEST:
         return None
     return _Swung(on, across, line, hinge, thickness)
 
@@ -170,15 +209,20 @@ def _inwards(
     sides: Float[np.ndarray, "2"],
     across: int,
 ) -> float:
-    """Sign of the way from the hinge of a door to its free edge, shut: away from the nearer side of the body.
+    """Sign of the way from the hinge of a door to its free edge, shut.
 
+    Away from the side of the body where the hinge is; elsewhere towards where there is room, or else by the smaller turn.
     A flap shuts upwards, where there is room for it.
     """
     hinge = line.across_at(front)
-    if across == 1:
-        return 1.0 if abs(sides[0] - hinge) < abs(sides[1] - hinge) else -1.0
+    near = np.abs(sides - hinge)
+    if across == 1 and near.min() < _EDGE:
+        return 1.0 if near.argmin() == 0 else -1.0
     length = float(np.percentile((flat - [front, hinge]) @ line.way, 99))
-    return 1.0 if hinge + length < sides[1] + _EDGE else -1.0
+    upwards, downwards = hinge + length < sides[1] + _EDGE, hinge - length > sides[0] - _EDGE
+    if upwards and downwards and across == 1:
+        return 1.0 if line.way[1] > 0 else -1.0
+    return 1.0 if upwards else -1.0
 
 
 def _line(flat: Float[np.ndarray, "n 2"]) -> _Line | None:
@@ -233,24 +277,29 @@ def _foremost(facing: Float[np.ndarray, "n"], about: float) -> float:
     near = facing[np.abs(facing - about) < _MISTAKEN]
     edges = np.arange(about - _MISTAKEN, about + _MISTAKEN + _BIN, _BIN)
     counts = np.convolve(np.histogram(near, edges)[0], np.ones(2), mode="same")
-    many = np.flatnonzero(counts > max(_LEAST, _SHARE * counts.max()))
+    many = np.flatnonzero(counts > max(_FEWEST, _SHARE * counts.max()))
     if not len(many):
         return about
     place = edges[many[-1]]
     return float(np.median(near[np.abs(near - place) < 2 * _BIN]))
 
 
-def _handle_guess(shut: Float[np.ndarray, "n 3"], swung: _Swung) -> Float[np.ndarray, "4 4"]:
-    """`T_object_handle`, about where points stand out of the panel, or else near its free edge; X along the hinge."""
-    panel = np.percentile(shut[swung.on], [1, 99], axis=0)
-    front = float(swung.hinge[0]) + swung.thickness
+def _handle_guess(
+    shut: Float[np.ndarray, "n 3"], panel: Float[np.ndarray, "2 3"], swung: _Swung
+) -> tuple[Float[np.ndarray, "4 4"], bool]:
+    """`T_object_handle`, about where points stand out of the panel, or else near its free edge; X along the hinge.
+
+    And which of the two it is.
+    """
+    front = float(panel[1, 0])
     out = shut[:, 0] - front
     on = (out > _HANDLE[0]) & (out < _HANDLE[1])
     on &= ((shut > panel[0]) & (shut < panel[1]))[:, 1:].all(axis=1)
     place = panel.mean(axis=0)
     near, far = panel[:, swung.across] if swung.line.inwards > 0 else panel[::-1, swung.across]
     place[swung.across] = near + _FREE * (far - near)
-    if on.sum() > _HANDLE_LEAST:
+    seen = int(on.sum()) > _HANDLE_LEAST
+    if seen:
         place = np.median(shut[on], axis=0)
     place[0] = front + 0.03
-    return compose(ACROSS_FRONT if swung.across == 2 else UP_FRONT, place)
+    return compose(ACROSS_FRONT if swung.across == 2 else UP_FRONT, place), seen

@@ -132,7 +132,7 @@ def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         low, high = part.joint.range
         share = (part.opening - low) / (high - low)
         if isinstance(goal, OpenGoal):
-            wrong = share < float(goal.fraction) - NOT_OPEN
+            wrong = part.goes_on or share < float(goal.fraction) - NOT_OPEN
         elif goal.fraction is not None:
             wrong = share > 1 - float(goal.fraction)
         else:

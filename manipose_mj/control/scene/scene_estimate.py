@@ -111,6 +111,7 @@ class PartEstimate:
       geoms: Mask of its geoms there, `(ngeom,)`.
       bodies_inside: Bodies of the objects in its cavity, which move with a drawer.
       cavity_seen: Whether the cavity is known; else it is what is usual behind such a part.
+      goes_on: Whether it was opened as far as is usual, and did not stop: it opens further than anybody knows.
     """
 
     name: str
@@ -124,6 +125,7 @@ class PartEstimate:
     geoms: Bool[np.ndarray, "ngeom"]
     bodies_inside: tuple[int, ...] = ()
     cavity_seen: bool = True
+    goes_on: bool = False
 
     @property
     def handle_pose(self) -> Float[np.ndarray, "4 4"]:

@@ -38,15 +38,16 @@ def test_a_door_turns_about_the_edge_that_is_farthest_from_its_handle(
 
 
 @pytest.mark.parametrize(
-    ("axis", "place", "can"),
+    ("axis", "across", "place", "can"),
     [
-        (X, (0.07, 0.4), False),  # a knob's
-        (-Z, (0.07, 0.4), True),
-        (Y, (-0.1, 0.57), True),
-        (Y, (0.07, 0.57), False),  # no flap has its handle in a corner
-        (np.array([0.5, 0.0, 0.85]), (0.07, 0.4), False),
+        (X, 0.0, (0.07, 0.4), False),  # a knob's
+        (-Z, -0.29, (0.07, 0.4), True),
+        (-Z, -0.1, (0.07, 0.4), False),  # in the middle of its panel
+        (Y, 0.0, (-0.1, 0.57), True),
+        (Y, 0.0, (0.07, 0.57), False),  # no flap has its handle in a corner
+        (np.array([0.5, 0.0, 0.85]), -0.29, (0.07, 0.4), False),
     ],
 )
-def test_axes_of_doors_lie_in_the_front(axis, place, can):
-    axis = axis / np.linalg.norm(axis)
-    assert can_be_a_door(axis, handle(*place), PANEL) is can
+def test_hinges_of_doors_lie_in_the_front_at_an_edge(axis, across, place, can):
+    origin, axis = np.array([0.2, across, 0.3]), axis / np.linalg.norm(axis)
+    assert can_be_a_door(origin, axis, handle(*place), PANEL) is can

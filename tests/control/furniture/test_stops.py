@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipose_mj.control.furniture.stops import Stops
+from manipose_mj.control.furniture.stops import Stops, Swings
 
 USUAL = 0.32
 
@@ -27,3 +27,26 @@ def test_a_stop_near_the_usual_end_is_one_and_a_stop_at_the_start_is_none():
     assert not stops.is_end("drawer", "slide", 0.05, USUAL)
     assert stops.is_end("door", "hinge", 1.5, 1.75)
     assert not stops.is_end("door", "hinge", 1.0, 1.75)
+
+
+def test_a_door_that_goes_along_with_every_push_opens_further_until_it_stops():
+    swings = Swings()
+    assert swings.end("door", 1.0, 1.92) == 1.92  # nobody pushed it
+    swings.pushed("door", 1.2)
+    assert swings.end("door", 1.2, 1.92) == 1.92  # far from its usual end
+    swings.pushed("door", 1.91)
+    further = swings.end("door", 1.90, 1.92)
+    assert further > 2.3
+    assert swings.goes_on("door")
+    swings.pushed("door", 2.3)
+    assert swings.end("door", 2.28, further) > 2.7
+    swings.pushed("door", 2.8)
+    assert swings.end("door", 2.45, 2.8) == 2.45  # it stayed behind
+    assert not swings.goes_on("door")
+
+
+def test_a_door_that_stops_where_it_usually_does_opens_no_further():
+    swings = Swings()
+    swings.pushed("door", 1.91)
+    assert swings.end("door", 1.75, 1.92) == 1.92
+    assert not swings.goes_on("door")
