@@ -18,7 +18,7 @@ _ALONG = 0.4  # cosine between normals of a door and its hinge, at most
 _PLANE = 0.012  # how far points of a door are from its plane [m]
 _LEAST, _SMALLEST = 200, 0.08  # points of a door; its sides [m]
 _AJAR, _WIDEST = 0.5, 2.9  # openings at which a door stands out [rad]
-# Between the faces of a door [m]: where one alone shows, at least, at most.
+# Between the faces of a door [m]: where neither both show nor the rim that it shuts against, at least, at most.
 _THICKNESS, _THINNEST, _THICKEST = 0.018, 0.008, 0.05
 _ONE_FACE = 0.006  # how far points of a face are from it [m]
 _FACES = 0.7  # cosine between their normals and the face's, at least
@@ -184,7 +184,7 @@ def _swung(
         return None
     sides = np.percentile(points[body, across], [1, 99])
     line = replace(line, inwards=_inwards(line, flat[out], front, sides, across))
-    line, thickness = _outer_face(line, flat[out], faces[out])
+    line, thickness = _outer_face(line, flat[out], faces[out], _rim_depth(facing, front))
     # Most hinges are at the inner face; that is where the body's rim is, if not where its front is.
     rim = np.abs(facing - (front - thickness)) < 2 * _BIN
     inner = line.moved(-thickness)
@@ -247,15 +247,15 @@ def _line(flat: Float[np.ndarray, "n 2"]) -> _Line | None:
 
 
 def _outer_face(
-    line: _Line, flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"]
+    line: _Line, flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"], usual: float
 ) -> tuple[_Line, float]:
-    """The line of the outer face, and how far behind it the inner one is [m]: each of them may be all that shows."""
+    """The line of the outer face, and how far behind it the inner one is [m]: `usual`, where one alone shows."""
     near = np.abs(line.before(flat)) < _THICKEST
     flat, faces = flat[near], faces[near]
     outer, inner = (sign * (faces @ line.outwards) > _FACES for sign in (1.0, -1.0))
     shown, sign = (outer, 1.0) if outer.sum() >= _LEAST else (inner, -1.0)
     if shown.sum() < _LEAST:
-        return line, _THICKNESS
+        return line, usual
     off = line.before(flat[shown])
     on_face = np.abs(off - np.median(off)) < _ONE_FACE
     # Its normals tell better than its points how it is turned: frames stand before panes.
@@ -264,12 +264,23 @@ def _outer_face(
     line = replace(line, middle=flat[shown][on_face].mean(axis=0), way=way)
     outer, inner = flat[outer], flat[inner]
     if len(outer) < _LEAST:
-        return line.moved(_THICKNESS), _THICKNESS
+        return line.moved(usual), usual
     if len(inner) < _LEAST:
-        return line, _THICKNESS
+        return line, usual
     # A frame around a pane is as thick as the door.
     behind = float(-np.percentile(line.before(inner), 10))
     return line, float(np.clip(behind, _THINNEST, _THICKEST))
+
+
+def _rim_depth(facing: Float[np.ndarray, "n"], front: float) -> float:
+    """How far behind the front the rim is that a door shuts against, and so how thick the door is [m]."""
+    behind = front - facing
+    behind = behind[(behind > _THINNEST) & (behind < _THICKEST)]
+    counts, edges = np.histogram(behind, np.arange(_THINNEST, _THICKEST, _BIN))
+    if counts.max() < _LEAST:
+        return _THICKNESS
+    place = edges[int(counts.argmax())] + _BIN / 2
+    return float(np.median(behind[np.abs(behind - place) < _BIN]))
 
 
 def _foremost(facing: Float[np.ndarray, "n"], about: float) -> float:
