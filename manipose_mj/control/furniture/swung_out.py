@@ -144,11 +144,12 @@ def swung_out(model: FurnitureModel, cloud: SceneCloud) -> OpenDoor | None:
 
 def with_open_door(sensed: SensedFurniture, door: OpenDoor) -> SensedFurniture:
     """The same with this door instead of all that was sensed on it; of that, its handle where no better one shows."""
-    on = [part for part in sensed.parts if door.carries(part.handle[:3, 3])]
-    others = tuple(part for part in sensed.parts if not door.carries(part.handle[:3, 3]))
+    on = [door.carries(part.handle[:3, 3]) for part in sensed.parts]
+    handles = [part for part, its in zip(sensed.parts, on, strict=True) if its]
+    others = tuple(part for part, its in zip(sensed.parts, on, strict=True) if not its)
     part = door.sensed
-    if on and not door.handle_seen:
-        part = replace(part, handle=max(on, key=lambda each: each.confidence).handle)
+    if handles and not door.handle_seen:
+        part = replace(part, handle=max(handles, key=lambda each: each.confidence).handle)
     return replace(sensed, parts=(part, *others))
 
 
@@ -185,6 +186,8 @@ def _swung(
     sides = np.percentile(points[body, across], [1, 99])
     line = replace(line, inwards=_inwards(line, flat[out], front, sides, across))
     line, thickness = _outer_face(line, flat[out], faces[out], _rim_depth(facing, front))
+    if not _AJAR < line.opening < _WIDEST:
+        return None
     # Most hinges are at the inner face; that is where the body's rim is, if not where its front is.
     rim = np.abs(facing - (front - thickness)) < 2 * _BIN
     inner = line.moved(-thickness)
@@ -192,7 +195,7 @@ def _swung(
     hinge = np.array([x, inner.across_at(x)])
     before = line.before(flat)
     on = (before < _PLANE) & (before > -thickness - _PLANE) & (points[:, 0] > front)
-    if not on.any() or not _AJAR < line.opening < _WIDEST:
+    if not on.any():
         return None
     begins = float(np.percentile((flat[on] - hinge) @ line.way, 1))
     upright = float(np.ptp(np.percentile(points[on, 3 - across], [1, 99])))
@@ -253,22 +256,22 @@ def _outer_face(
     near = np.abs(line.before(flat)) < _THICKEST
     flat, faces = flat[near], faces[near]
     outer, inner = (sign * (faces @ line.outwards) > _FACES for sign in (1.0, -1.0))
-    shown, sign = (outer, 1.0) if outer.sum() >= _LEAST else (inner, -1.0)
-    if shown.sum() < _LEAST:
+    outer_shows, inner_shows = outer.sum() >= _LEAST, inner.sum() >= _LEAST
+    if not outer_shows and not inner_shows:
         return line, usual
+    shown, sign = (outer, 1.0) if outer_shows else (inner, -1.0)
     off = line.before(flat[shown])
     on_face = np.abs(off - np.median(off)) < _ONE_FACE
     # Its normals tell better than its points how it is turned: frames stand before panes.
     normal = sign * np.median(faces[shown][on_face], axis=0)
     way = line.inwards * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
     line = replace(line, middle=flat[shown][on_face].mean(axis=0), way=way)
-    outer, inner = flat[outer], flat[inner]
-    if len(outer) < _LEAST:
+    if not outer_shows:
         return line.moved(usual), usual
-    if len(inner) < _LEAST:
+    if not inner_shows:
         return line, usual
     # A frame around a pane is as thick as the door.
-    behind = float(-np.percentile(line.before(inner), 10))
+    behind = float(-np.percentile(line.before(flat[inner]), 10))
     return line, float(np.clip(behind, _THINNEST, _THICKEST))
 
 
