@@ -85,8 +85,10 @@ def _corners(observation: Observation) -> tuple[Float[Array, "*b 3"], Float[Arra
 def command(observation: Observation, action: Float[Array, "*b 7"]) -> Float[Array, "*b 7"]:
     """An action of the control mode `pd_ee_pose`, as of `grip.command`, but for where the hand goes and how it turns.
 
-    These are the finer the nearer the grip is, where a box leaves the fingers millimetres: cubes of the numbers.
+    These are the finer the nearer the grip is, where a box leaves the fingers millimetres: cubes of the numbers. The
+    gripper is fully open or shut, by the sign of its number, since a box leaves half open fingers no room.
     """
     motion = jnp.clip(action[..., :6], -1.0, 1.0) ** 3
-    action = jnp.concatenate([motion, action[..., 6:]], axis=-1)
+    opening = jnp.where(action[..., 6:] > 0, 1.0, -1.0)
+    action = jnp.concatenate([motion, opening], axis=-1)
     return grip.command(grip_frame(observation), grip.tcp_pose(observation), action)

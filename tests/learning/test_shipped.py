@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from importlib import resources
 from pathlib import Path
 
@@ -13,17 +15,23 @@ from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
 from manipose_mj.learning import TrainedPolicy
 
+ROOT = Path(__file__).parents[2]
 WEIGHTS = Path(str(resources.files("manipose_mj.learning"))) / "weights"
-SHIPPED = ("open_cabinet_door", "open_middle_drawer")
+SHIPPED = {
+    "lift": "example/lift",
+    "open_cabinet_door": "articulated/open_cabinet_door",
+    "open_middle_drawer": "articulated/open_middle_drawer",
+}
+LIFTED = ("apple", "bottle", "box", "can", "candle", "chips_can", "drinkbox", "pear")
 
 
 def test_they_are_small_and_say_what_they_are():
     files = sorted(WEIGHTS.glob("*.npz"))
-    assert tuple(file.stem for file in files) == SHIPPED
+    assert [file.stem for file in files] == list(SHIPPED)
     assert sum(file.stat().st_size for file in files) < 2e6
-    for name in SHIPPED:
+    for name, task in SHIPPED.items():
         metadata = TrainedPolicy(name).metadata
-        assert (metadata["trained on"], metadata["seed"]) == (f"articulated/{name}", 0)
+        assert (metadata["trained on"], metadata["seed"]) == (task, 0)
 
 
 @pytest.mark.full
@@ -50,3 +58,25 @@ def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, nam
     results = evaluate(config)
     assert {result.object for result in results} == {f"cabinet_{i:03}" for i in pieces}
     assert sum(result.success_at_end for result in results) >= least
+
+
+@pytest.mark.full
+def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
+    """In a process of its own, as the task is one of `benchmarks`."""
+    monkeypatch.setenv("MANIPOSE_TASKS", "lift_task")
+    objects = [f"{category}_{i:03}" for category in LIFTED for i in (4, 9, 14)]
+    command = (
+        *(sys.executable, "-m", "manipose_mj.cli.main", "evaluate", "example/lift"),
+        *("--policy", "manipose_mj.learning:TrainedPolicy", "--policy-args", '{"path": "lift"}'),
+        *("--obs-mode", "state+pose", "--control-mode", "pd_ee_pose", "--hz", "5"),
+        *("--episodes", "24", "--seed", "100", "--engine", "c", "--worlds", "24"),
+        *("--out", str(tmp_path), "--objects", *objects),
+    )
+    done = subprocess.run(
+        command, cwd=ROOT / "benchmarks" / "batch", capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
+    assert len(results) == 24
+    # In single environments 22, and of 100 90.
+    assert sum(result["success_at_end"] for result in results) >= 19
