@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,16 +11,21 @@ from dm_control import mjcf
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.furniture_fit import as_drawer, fit_furniture
+from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
+from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import seen_open
-from manipose_mj.control.furniture.opening_search import found_opening
+from manipose_mj.control.furniture.opening_search import Hidden, found_opening
 from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
-from manipose_mj.control.furniture.part_words import Candidate, meant_part
 from manipose_mj.control.furniture.pulled_out import pulled_out
-from manipose_mj.control.furniture.scene_cloud import SceneCloud, SceneViews
+from manipose_mj.control.furniture.scene_cloud import (
+    SceneCloud,
+    SceneViews,
+    hidden_from,
+    seen_past,
+)
+from manipose_mj.control.furniture.seen_through import Past
 from manipose_mj.control.furniture.stops import Stops, Swings
 from manipose_mj.control.furniture.swung_out import (
     OpenDoor,
@@ -37,7 +42,6 @@ from manipose_mj.tasks.goals import OpenGoal, ShutGoal
 from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
-_SURE_PART = 0.15  # confidence of parts that nobody asked for
 _LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
 _BEYOND = 0.05  # the usual range of a door, from which on nobody knows how far it opens [rad]
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
@@ -110,7 +114,7 @@ class EstimatedFurniture:
                 except InputError as error:
                     raise StageFailure("perception", f"{category}: {error}") from None
                 model = fit_furniture(cloud, sensed, category)
-                found.append((sensed, _named(model, asked, self._expected_open)))
+                found.append((sensed, named(model, asked, self._expected_open)))
                 if not self._looks_shut(found[-1][1]):
                     break
             else:
@@ -137,7 +141,7 @@ class EstimatedFurniture:
             elif (door := swung_out(model, cloud)) is not None:
                 sensed = with_open_door(sensed, door)
                 model = fit_furniture(cloud, sensed, model.category)
-                model = _named(model, asked, self._expected_open)
+                model = named(model, asked, self._expected_open)
                 part = next(part for part in model.parts if part.name == name)
                 if part.opening > 0.0:
                     self._sure[name] = part.part.joint
@@ -182,7 +186,7 @@ class EstimatedFurniture:
                 pose=model.pose @ part.motion(part.opening),
                 opening=part.opening,
                 joint=part.part.joint,
-                handle=_handle(part),
+                handle=handle_of(part),
                 cavity=part.part.cavity,
                 body=bodies[part.name],
                 geoms=geoms[part.name],
@@ -281,7 +285,7 @@ class EstimatedFurniture:
         if model is None:
             return
         cloud = self._cloud()
-        points = transform(invert(model.pose), cloud.points)
+        points, past = transform(invert(model.pose), cloud.points), self._past()
         doors = [part for part in model.parts if part.opening > 0.0 and part.hinged]
         door = swung_out(model, cloud) if doors else None
         for part in model.parts:
@@ -291,7 +295,8 @@ class EstimatedFurniture:
                     self._sure[part.name] = part.part.joint
                 found = part.at(found_opening(part, points, self._hidden()))
                 # What does not show stays as it is usual: nobody need look again.
-                model = model.with_part(replace(seen_open(model, found, cloud), seen_inside=True))
+                opened = replace(seen_open(model, found, cloud, past), seen_inside=True)
+                model = model.with_part(opened)
         self.model = model
 
     def _shall_open_wide(self, part: PartModel) -> bool:
@@ -304,7 +309,7 @@ class EstimatedFurniture:
     def _is_of(self, door: OpenDoor, part: PartModel) -> bool:
         """Whether a door that stands open is this part: it carries its handle."""
         assert self.model is not None
-        handle = self.model.pose @ part.motion(part.opening) @ _handle(part).pose
+        handle = self.model.pose @ part.motion(part.opening) @ handle_of(part).pose
         return door.carries(handle[:3, 3])
 
     def _part(self, name: str | None) -> PartModel | None:
@@ -316,65 +321,26 @@ class EstimatedFurniture:
 
     def _near(self, part: PartModel, tcp_pose: Float[np.ndarray, "4 4"]) -> bool:
         assert self.model is not None
-        handle = self.model.pose @ part.motion(part.opening) @ _handle(part).pose
+        handle = self.model.pose @ part.motion(part.opening) @ handle_of(part).pose
         return float(np.linalg.norm(handle[:3, 3] - tcp_pose[:3, 3])) < _NEAR
 
     def _cloud(self, cameras: tuple[str, ...] | None = None) -> SceneCloud:
         return self._views.cloud(self._physics, self._mask, cameras=cameras)
 
-    def _hidden(self) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
+    def _hidden(self) -> Hidden:
         """Which points, object frame [m], no camera can see now."""
         assert self.model is not None
-        pose, sights = self.model.pose, self._views.sights(self._physics)
+        return hidden_from(self._views.sights(self._physics), self.model.pose)
 
-        def hidden(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-            placed = transform(pose, points)
-            return ~np.any([sight.reaches(placed) for sight in sights], axis=0)
-
-        return hidden
+    def _past(self) -> Past:
+        """Which points, object frame [m], some camera looks past now."""
+        assert self.model is not None
+        return seen_past(self._views.sights(self._physics), self.model.pose)
 
     def _points(self) -> Float[np.ndarray, "n 3"]:
         assert self.model is not None
         cloud = self._views.cloud(self._physics, self._mask, normals=False)
         return transform(invert(self.model.pose), cloud.points)
-
-
-def _named(
-    model: FurnitureModel, asked: Mapping[str, str], expected_open: frozenset[str]
-) -> FurnitureModel:
-    """The parts that words mean called as goals call them; others only where they are sure.
-
-    Args:
-      model: With parts of any names.
-      asked: Words for parts, by the names that goals have.
-      expected_open: Of these names, those of parts that stand open.
-
-    Raises:
-      StageFailure: There is none.
-    """
-    parts = list(model.parts)
-    for name, words in asked.items():
-        free = [i for i, part in enumerate(parts) if part.name not in asked]
-        opened = [i for i in free if parts[i].opening > 0]
-        # What shall be shut stands open.
-        free = opened if name in expected_open and opened else free
-        index = meant_part(words, [_candidate(parts[i]) for i in free])
-        if index is None:
-            raise StageFailure("perception", f"no camera shows the {words} of the {model.category}")
-        chosen = parts[free[index]]
-        if "drawer" in words.split() and chosen.part.joint.kind == "hinge":
-            chosen = as_drawer(chosen)
-        parts[free[index]] = replace(chosen, part=replace(chosen.part, name=name))
-    kept = [part for part in parts if part.name in asked or part.confidence >= _SURE_PART]
-    return replace(model, parts=tuple(kept))
-
-
-def _candidate(part: PartModel) -> Candidate:
-    """How words see it: a drawer is wide, with its handle in the middle; a door is high, with its near an edge."""
-    low, high = part.panel[:, 1]
-    middle = abs(float(_handle(part).origin[1]) - (low + high) / 2) / max(high - low, 0.01)
-    _, width, height = np.maximum(part.panel[1] - part.panel[0], 0.01)
-    return Candidate(part.part, part.confidence, 2 * middle, float(height / (height + width)))
 
 
 def _inside(
@@ -392,8 +358,3 @@ def _inside(
             np.abs((to_part @ obj.label_pose)[:3, 3] - cavity.center) < cavity.extents / 2 + 0.01
         ).all()
     )
-
-
-def _handle(part: PartModel) -> PoseLabel:
-    assert part.part.handle is not None  # all parts that are found are found by it
-    return part.part.handle

@@ -11,6 +11,7 @@ from manipose_mj.assets.asset import Cavity
 from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.seen_through import Past, widened
 from manipose_mj.poses import invert, transform
 
 # Open so far, a part shows what is behind it [m, rad].
@@ -27,16 +28,23 @@ _SIDE_MARGIN = 0.004  # kept off sides that were measured [m]
 _UNSEEN = 0.02  # and off those that were not, from the panel's edges [m]
 _ROOF = 0.015  # below the panel's upper edge [m]
 _BEHIND_MOUTH = 0.06  # from where on what faces the front is no frame [m]
+_WALL, _WALL_SHARE = (
+    0.015,
+    0.3,
+)  # of points of a rear wall from its plane [m]; of what faces the front
 _RIM_ROOF = 0.006  # kept off a roof that was measured [m]
 
 
-def seen_open(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
+def seen_open(
+    model: FurnitureModel, part: PartModel, cloud: SceneCloud, past: Past | None = None
+) -> PartModel:
     """The part with what its open state shows; as it was where that is nothing.
 
     Args:
       model: The furniture.
       part: One of it, at its present opening.
       cloud: Of the furniture now, with normals.
+      past: Which points, object frame [m], some camera looks past; None: nobody knows.
     """
     kind = part.part.joint.kind
     if part.opening < _TELLING[kind]:
@@ -47,7 +55,7 @@ def seen_open(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> Part
     if kind == "slide":
         back = invert(part.motion(part.opening))
         return _drawer(part, transform(back, points), normals)
-    return _door(model, part, points, normals)
+    return _door(model, part, points, normals, past)
 
 
 def _drawer(
@@ -79,6 +87,7 @@ def _door(
     part: PartModel,
     points: Float[np.ndarray, "n 3"],
     normals: Float[np.ndarray, "n 3"],
+    past: Past | None,
 ) -> PartModel:
     """From what shows through the opening, and of the door itself."""
     measured = replace(part, panel=_door_panel(part, points, normals))
@@ -104,12 +113,17 @@ def _door(
     facing = behind & (normals[:, 0] > _FACING)
     rear = float(np.percentile(points[inside, 0], 3))
     if facing.sum() >= _LEAST:
-        rear = _mode(points[facing, 0]) + 0.004
-    hole_low = np.array([rear, left, floor])
-    hole_high = np.array([mouth, right, roof])
-    if (hole_high - hole_low < 0.05).any():
+        wall = _mode(points[facing, 0])
+        # What faces the front by chance is spread over the whole depth.
+        if (np.abs(points[facing, 0] - wall) < _WALL).mean() > _WALL_SHARE:
+            rear = wall + 0.004
+    hole = np.array([[rear, left, floor], [mouth, right, roof]])
+    if (np.ptp(hole, axis=0) < 0.05).any():
         return measured
-    cavity = Cavity((hole_low + hole_high) / 2, hole_high - hole_low, moves_with_part=False)
+    if past is not None:
+        body = np.array([model.solid[:, 0].min(axis=0), model.solid[:, 1].max(axis=0)])
+        hole = widened(hole, body, past)
+    cavity = Cavity(hole.mean(axis=0), np.ptp(hole, axis=0), moves_with_part=False)
     return replace(measured, part=replace(part.part, cavity=cavity), seen_inside=True)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 from manipose_mj.poses import invert, transform
 
 _IN_FRONT = 0.03  # what is that much nearer to a camera hides what is behind it [m]
+_BEHIND = 0.01  # what is that much further from a camera than a point leaves it free [m]
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,15 @@ class Sight:
     intrinsics: Intrinsics
     pose: Float[np.ndarray, "4 4"]
 
-    def reaches(self, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-        """Which points, world frame [m], it would see if they were there: nothing is in front of them."""
+    def reaches(
+        self, points: Float[np.ndarray, "n 3"], beyond: float = -_IN_FRONT
+    ) -> Bool[np.ndarray, "n"]:
+        """Which points, world frame [m], it would see if they were there: nothing is in front of them.
+
+        Args:
+          points: To look for.
+          beyond: How far behind a point what is seen there has to be [m].
+        """
         local, k = transform(invert(self.pose), points), self.intrinsics
         z = np.maximum(local[:, 2], 1e-6)
         column = np.floor(local[:, 0] / z * k.fx + k.cx + 0.5)
@@ -55,8 +63,32 @@ class Sight:
         inside &= (row >= 0) & (row < self.depth.shape[0])
         measured = self.depth[row[inside].astype(int), column[inside].astype(int)]
         reached = np.zeros(len(points), bool)
-        reached[inside] = (measured > 0) & (measured > z[inside] - _IN_FRONT)
+        reached[inside] = (measured > 0) & (measured > z[inside] + beyond)
         return reached
+
+
+def hidden_from(
+    sights: Sequence[Sight], pose: Float[np.ndarray, "4 4"]
+) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
+    """Which points, of the frame at `pose` in the world [m], none of the cameras can see for what is in front of them."""
+
+    def hidden(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+        placed = transform(pose, points)
+        return ~np.any([sight.reaches(placed) for sight in sights], axis=0)
+
+    return hidden
+
+
+def seen_past(
+    sights: Sequence[Sight], pose: Float[np.ndarray, "4 4"]
+) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
+    """Which points, of the frame at `pose` in the world [m], some camera looks past: they are free."""
+
+    def past(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+        placed = transform(pose, points)
+        return np.any([sight.reaches(placed, _BEHIND) for sight in sights], axis=0)
+
+    return past
 
 
 class SceneViews:

@@ -84,8 +84,8 @@ def test_shelves_divide_what_is_behind_a_door(shelves, floor, roof):
     assert [space.floor, space.roof] == pytest.approx([floor, roof], abs=0.003)
 
 
-def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
-    points, normals = oven(rack=True)
+def opened_oven() -> tuple[FurnitureModel, PartModel]:
+    """Its door open."""
     handle = PoseLabel(
         np.zeros(3), np.eye(3), "handle", np.full(3, 0.02), SymmetryGroup(np.eye(3)[None])
     )
@@ -94,7 +94,12 @@ def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
         MovingPart("door", joint, handle, None), PANEL, no_boxes(), 1.6, 0.9, np.zeros((0, 3))
     )
     solid = np.array([[[-0.22, -0.3, 0.0], [0.2, 0.3, 0.32]]])
-    model = FurnitureModel(np.eye(4), solid, (door,), "oven")
+    return FurnitureModel(np.eye(4), solid, (door,), "oven"), door
+
+
+def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
+    points, normals = oven(rack=True)
+    model, door = opened_oven()
     # The door's own free edge is where its opening ends, not where the panel was guessed to.
     face, across = sheet([0.18, -0.25, 0.0], [0.18, RIGHT + 0.01, 0.30], X)
     motion = door.motion(door.opening)
@@ -110,3 +115,17 @@ def test_an_open_door_shows_the_whole_cavity_and_where_it_ends_itself():
     # Nothing that is put into what was found sticks out of what there is.
     assert (low > [REAR - 0.002, LEFT - 0.002, RACK - 0.003]).all()
     assert (high < [MOUTH + 0.002, RIGHT + 0.002, ROOF + 0.002]).all()
+
+
+def test_normals_that_face_the_front_by_chance_are_no_rear_wall():
+    """Where objects hide it, a few points of floor and sides do."""
+    points, normals = oven(rack=False)
+    shown = (points[:, 0] > REAR + 0.01) | (normals[:, 2] > 0.5)
+    points, normals = points[shown], normals[shown].copy()
+    inside = np.flatnonzero(np.abs(points[:, 0] - 0.02) < 0.08)
+    normals[np.random.default_rng(0).choice(inside, 60, replace=False)] = X
+    model, door = opened_oven()
+    found = seen_open(model, door, SceneCloud(points, normals, np.ones(len(points), int)))
+    assert found.part.cavity is not None
+    low = found.part.cavity.center - found.part.cavity.extents / 2
+    assert low[0] == pytest.approx(REAR, abs=0.025)
