@@ -16,7 +16,7 @@ from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartMo
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import seen_open
-from manipose_mj.control.furniture.opening_search import Hidden, found_opening
+from manipose_mj.control.furniture.opening_search import Hidden, found_opening, misfit
 from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
 from manipose_mj.control.furniture.pulled_out import pulled_out
 from manipose_mj.control.furniture.scene_cloud import (
@@ -290,13 +290,19 @@ class EstimatedFurniture:
         door = swung_out(model, cloud) if doors else None
         for part in model.parts:
             if part.opening > 0.0:
+                hidden = self._hidden()
+                found = part.at(found_opening(part, points, hidden))
                 if door is not None and part.hinged and self._is_of(door, part):
-                    part = as_seen_open(part, door, model.pose)
-                    self._sure[part.name] = part.part.joint
-                found = part.at(found_opening(part, points, self._hidden()))
+                    panel = as_seen_open(part, door, model.pose)
+                    panel = panel.at(found_opening(panel, points, hidden))
+                    # What the hand felt may be better: a pane before a frame looks turned.
+                    if misfit(panel, points, hidden) < misfit(found, points, hidden):
+                        found = panel
+                        self._sure[part.name] = panel.part.joint
                 # What does not show stays as it is usual: nobody need look again.
                 opened = replace(seen_open(model, found, cloud, past), seen_inside=True)
-                model = model.with_part(opened)
+                asked = asked_parts(self._task)
+                model = model.with_part(opened).without_fronts_over(opened, asked)
         self.model = model
 
     def _shall_open_wide(self, part: PartModel) -> bool:

@@ -5,6 +5,7 @@ The object frame is upright: X out of the front, Z up. All boxes are of that fra
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ _TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]
 _TRAY_BEHIND = (
     0.02  # of a drawer that the body still covers when it is wide open: its back does not show [m]
 )
+_EDGE = 0.02  # by which panels overlap at their edges without being over one another [m]
 _BEFORE_FRONT = 0.03  # by how much a hole reaches out of the front [m]
 
 
@@ -131,6 +133,49 @@ class FurnitureModel:
     def with_part(self, part: PartModel) -> FurnitureModel:
         """The same with another state of the part of that name."""
         return replace(self, parts=tuple(part if p.name == part.name else p for p in self.parts))
+
+    def without_fronts_over(self, opened: PartModel, asked: Collection[str]) -> FurnitureModel:
+        """The same once a part has left the front: what it shut is no other part's.
+
+        A knob above an oven's door may have been taken for the handle of one that reaches over it.
+
+        Args:
+          opened: The part, its panel measured.
+          asked: Names of parts that are kept whatever their panel is.
+        """
+        parts = []
+        for part in self.parts:
+            if part.name != opened.name and _overlap(part.panel, opened.panel):
+                panel = _beside(part, opened.panel)
+                if panel is not None:
+                    part = replace(part, panel=panel)
+                elif part.name not in asked:
+                    continue
+            parts.append(part)
+        return replace(self, parts=tuple(parts))
+
+
+def _overlap(one: Float[np.ndarray, "2 3"], other: Float[np.ndarray, "2 3"]) -> bool:
+    """Whether panels have more than their edges in common."""
+    low, high = np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+    return bool((high - low > _EDGE)[1:].all())
+
+
+def _beside(part: PartModel, opening: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "2 3"] | None:
+    """The largest of what an opening leaves of a panel to one of its sides; with the handle, or None."""
+    assert part.part.handle is not None
+    handle = part.part.handle.origin
+    left = []
+    for axis in (1, 2):
+        for end in (0, 1):
+            rest = part.panel.copy()
+            if end == 0:
+                rest[1, axis] = min(rest[1, axis], opening[0, axis])
+            else:
+                rest[0, axis] = max(rest[0, axis], opening[1, axis])
+            if ((handle > rest[0]) & (handle < rest[1]))[1:].all():
+                left.append(rest)
+    return max(left, key=lambda rest: np.prod((rest[1] - rest[0])[1:]), default=None)
 
 
 def _tray(cavity: Cavity, panel: Float[np.ndarray, "2 3"]) -> Boxes:

@@ -55,27 +55,9 @@ def found_opening(
       before: An opening that the part had before somebody tried to move it to the present one: it may be anywhere in
         between.
     """
-    looks = part.looks[:_MOST]
-    if len(looks) < 20 or len(points) < 50:
+    if len(part.looks) < 20 or len(points) < 50:
         return part.opening
-    kind = part.part.joint.kind
-    tree = cKDTree(points)
-    # A door that stands wide open turns its other side to the cameras; a drawer never does.
-    sides = [looks]
-    if kind == "hinge":
-        sides += [looks - [thickness, 0.0, 0.0] for thickness in _THICKNESSES]
-
-    def off(place: Float[np.ndarray, "n 3"]) -> float:
-        distances = np.minimum(tree.query(place, distance_upper_bound=_FAR)[0], _FAR)
-        if hidden is not None:
-            distances = np.where(hidden(place), np.minimum(distances, _HIDDEN * _FAR), distances)
-        nearest = np.sort(distances)
-        return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
-
-    def misfit(opening: float) -> float:
-        motion = part.motion(opening)
-        return min(off(transform(motion, side)) for side in sides)
-
+    kind, misfit = part.part.joint.kind, _misfits(part, points, hidden)
     coarse, fine = _STEPS[kind]
     ends = [part.opening, part.opening if before is None else before]
     least = max(min(ends) - _WITHIN[kind], 0.0)
@@ -90,6 +72,34 @@ def found_opening(
         tilt = _tilt(part, points)
         best = best if tilt is None else tilt
     return 0.0 if best < _SHUT[kind] else float(best)
+
+
+def misfit(
+    part: PartModel, points: Float[np.ndarray, "n 3"], hidden: Hidden | None = None
+) -> float:
+    """How far the looks of a part, as it stands, are from what is seen [m]; arguments as of `found_opening`."""
+    return _misfits(part, points, hidden)(part.opening)
+
+
+def _misfits(
+    part: PartModel, points: Float[np.ndarray, "n 3"], hidden: Hidden | None
+) -> Callable[[float], float]:
+    """The misfit at any opening."""
+    looks, kind = part.looks[:_MOST], part.part.joint.kind
+    tree = cKDTree(points)
+    # A door that stands wide open turns its other side to the cameras; a drawer never does.
+    sides = [looks]
+    if kind == "hinge":
+        sides += [looks - [thickness, 0.0, 0.0] for thickness in _THICKNESSES]
+
+    def off(place: Float[np.ndarray, "n 3"]) -> float:
+        distances = np.minimum(tree.query(place, distance_upper_bound=_FAR)[0], _FAR)
+        if hidden is not None:
+            distances = np.where(hidden(place), np.minimum(distances, _HIDDEN * _FAR), distances)
+        nearest = np.sort(distances)
+        return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
+
+    return lambda opening: min(off(transform(part.motion(opening), side)) for side in sides)
 
 
 def _tilt(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float | None:

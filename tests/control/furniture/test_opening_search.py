@@ -14,7 +14,7 @@ from manipose_mj.control.furniture.boxes import no_boxes
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.handle_shape import handle_label
 from manipose_mj.control.furniture.opened_part import seen_open
-from manipose_mj.control.furniture.opening_search import found_opening
+from manipose_mj.control.furniture.opening_search import found_opening, misfit
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import compose, transform
 
@@ -121,3 +121,43 @@ def test_a_door_that_is_not_quite_shut_is_measured_by_its_tilt(opening):
     body = plane([FRONT - 0.004, -0.3, 0.0], [FRONT - 0.004, 0.3, 0.1])
     found = found_opening(part.at(0.0), np.concatenate([seen, body]))
     assert found == pytest.approx(opening, abs=0.012)
+
+
+def test_a_door_fits_best_as_it_stands():
+    door = a_part("hinge")
+    seen = transform(door.motion(1.5), door.looks)
+    fits = [misfit(door.at(opening), seen) for opening in (1.3, 1.45, 1.5, 1.55, 1.7)]
+    assert int(np.argmin(fits)) == 2
+    turned = replace(
+        door, part=replace(door.part, joint=replace(door.part.joint, origin=np.zeros(3)))
+    )
+    assert misfit(turned.at(1.5), seen) > 2 * misfit(door.at(1.5), seen)
+
+
+def knob(y: float, z: float, panel: np.ndarray) -> PartModel:
+    """A part that was found by its handle, and the front that it was thought to shut."""
+    part = a_part("hinge")
+    assert part.part.handle is not None
+    handle = replace(part.part.handle, origin=np.array([FRONT + 0.03, y, z]))
+    return replace(part, panel=panel, part=replace(part.part, name="knob", handle=handle))
+
+
+@pytest.mark.parametrize("asked", [(), ("knob",)])
+def test_what_an_open_door_shut_is_no_front_of_a_knob_beside_it(asked):
+    door = a_part("hinge")
+    over = np.array([[0.18, -0.2, 0.1], [FRONT, 0.05, 0.35]])
+    above, beside = knob(0.0, 0.3, over), knob(0.3, 0.2, over + [[0, 0.45, 0], [0, 0.45, 0]])
+    model = FurnitureModel(np.eye(4), np.zeros((0, 2, 3)), (door, above), "oven")
+    left = model.without_fronts_over(door, asked)
+    assert [part.name for part in left.parts] == ["it", "knob"]
+    np.testing.assert_allclose(left.parts[1].panel, [[0.18, -0.2, 0.25], [FRONT, 0.05, 0.35]])
+    # One that is not over the door stays.
+    model = replace(model, parts=(door, beside))
+    assert model.without_fronts_over(door, asked).parts == (door, beside)
+
+
+def test_a_part_found_on_an_open_door_is_gone_unless_it_is_asked_for():
+    door, on = a_part("hinge"), knob(0.0, 0.2, PANEL.copy())
+    model = FurnitureModel(np.eye(4), np.zeros((0, 2, 3)), (door, on), "oven")
+    assert model.without_fronts_over(door, ()).parts == (door,)
+    assert model.without_fronts_over(door, ("knob",)).parts == (door, on)
