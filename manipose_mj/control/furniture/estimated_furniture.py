@@ -25,7 +25,6 @@ from manipose_mj.control.furniture.scene_cloud import (
     hidden_from,
     seen_past,
 )
-from manipose_mj.control.furniture.seen_through import Past
 from manipose_mj.control.furniture.stops import Stops, Swings
 from manipose_mj.control.furniture.swung_out import (
     OpenDoor,
@@ -285,23 +284,23 @@ class EstimatedFurniture:
         if model is None:
             return
         cloud = self._cloud()
-        points, past = transform(invert(model.pose), cloud.points), self._past()
+        points, asked = transform(invert(model.pose), cloud.points), asked_parts(self._task)
+        sights = self._views.sights(self._physics)
+        hidden, past = hidden_from(sights, model.pose), seen_past(sights, model.pose)
         doors = [part for part in model.parts if part.opening > 0.0 and part.hinged]
         door = swung_out(model, cloud) if doors else None
         for part in model.parts:
             if part.opening > 0.0:
-                hidden = self._hidden()
                 found = part.at(found_opening(part, points, hidden))
                 if door is not None and part.hinged and self._is_of(door, part):
                     panel = as_seen_open(part, door, model.pose)
                     panel = panel.at(found_opening(panel, points, hidden))
-                    # What the hand felt may be better: a pane before a frame looks turned.
+                    # What the hand felt may be better: a pane behind its frame looks turned.
                     if misfit(panel, points, hidden) < misfit(found, points, hidden):
                         found = panel
                         self._sure[part.name] = panel.part.joint
                 # What does not show stays as it is usual: nobody need look again.
                 opened = replace(seen_open(model, found, cloud, past), seen_inside=True)
-                asked = asked_parts(self._task)
                 model = model.with_part(opened).without_fronts_over(opened, asked)
         self.model = model
 
@@ -337,11 +336,6 @@ class EstimatedFurniture:
         """Which points, object frame [m], no camera can see now."""
         assert self.model is not None
         return hidden_from(self._views.sights(self._physics), self.model.pose)
-
-    def _past(self) -> Past:
-        """Which points, object frame [m], some camera looks past now."""
-        assert self.model is not None
-        return seen_past(self._views.sights(self._physics), self.model.pose)
 
     def _points(self) -> Float[np.ndarray, "n 3"]:
         assert self.model is not None

@@ -46,14 +46,12 @@ class Sight:
     intrinsics: Intrinsics
     pose: Float[np.ndarray, "4 4"]
 
-    def reaches(
-        self, points: Float[np.ndarray, "n 3"], beyond: float = -_IN_FRONT
-    ) -> Bool[np.ndarray, "n"]:
+    def reaches(self, points: Float[np.ndarray, "n 3"], beyond: float) -> Bool[np.ndarray, "n"]:
         """Which points, world frame [m], it would see if they were there: nothing is in front of them.
 
         Args:
           points: To look for.
-          beyond: How far behind a point what is seen there has to be [m].
+          beyond: How far behind a point what is seen there has to be [m]; negative: how far it may be before it.
         """
         local, k = transform(invert(self.pose), points), self.intrinsics
         z = np.maximum(local[:, 2], 1e-6)
@@ -71,24 +69,21 @@ def hidden_from(
     sights: Sequence[Sight], pose: Float[np.ndarray, "4 4"]
 ) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
     """Which points, of the frame at `pose` in the world [m], none of the cameras can see for what is in front of them."""
-
-    def hidden(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-        placed = transform(pose, points)
-        return ~np.any([sight.reaches(placed) for sight in sights], axis=0)
-
-    return hidden
+    return lambda points: ~_reached(sights, transform(pose, points), -_IN_FRONT)
 
 
 def seen_past(
     sights: Sequence[Sight], pose: Float[np.ndarray, "4 4"]
 ) -> Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]:
     """Which points, of the frame at `pose` in the world [m], some camera looks past: they are free."""
+    return lambda points: _reached(sights, transform(pose, points), _BEHIND)
 
-    def past(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-        placed = transform(pose, points)
-        return np.any([sight.reaches(placed, _BEHIND) for sight in sights], axis=0)
 
-    return past
+def _reached(
+    sights: Sequence[Sight], points: Float[np.ndarray, "n 3"], beyond: float
+) -> Bool[np.ndarray, "n"]:
+    """Which points one of the cameras reaches, as `Sight.reaches`."""
+    return np.any([sight.reaches(points, beyond) for sight in sights], axis=0)
 
 
 class SceneViews:
