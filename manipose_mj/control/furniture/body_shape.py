@@ -16,9 +16,12 @@ _CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
 def ends_of(
     points: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Low and high corner of points, strays left out; what is far away counts as much as what is near [m]."""
+    """Low and high corner of points, strays left out; what is far away counts as much as what is near [m].
+
+    Where points are so few that all look like strays, all count.
+    """
     cells, counts = np.unique(np.floor(points / _CELL).astype(int), axis=0, return_counts=True)
-    middles = (cells[counts >= _CELL_LEAST] + 0.5) * _CELL
+    middles = (cells[counts >= min(_CELL_LEAST, counts.max())] + 0.5) * _CELL
     low, high = np.percentile(middles, [0.4, 99.6], axis=0)
     return low, high
 
