@@ -16,6 +16,7 @@ from manipose_mj.control.furniture.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, can_be_a_door, likely_hinge
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
+from manipose_mj.control.furniture.object_frame import AJAR, object_pose
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.poses import compose, invert, transform
@@ -25,7 +26,6 @@ DRAWER_SHARE, TYPICAL_DRAWER = 0.70, 0.32
 TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
 LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
 _SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
-_AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m, rad]
 _PANEL = 0.018  # thickness [m]
 _WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
 _REAR = 0.03  # behind them [m]
@@ -52,7 +52,7 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
       sensed: Its front and parts.
       category: Such as `"cabinet"`.
     """
-    pose = _object_pose(cloud, sensed)
+    pose = object_pose(cloud, sensed)
     points = transform(invert(pose), cloud.points)
     normals = cloud.normals @ pose[:3, :3]
     shut = [_as_if_shut(part, pose) for part in sensed.parts]
@@ -107,21 +107,6 @@ def _one_door(part: PartModel, other: PartModel) -> bool:
     return float(np.linalg.norm(apart)) < _ONE_HINGE and bool((overlap[1:] > 0.05).all())
 
 
-def _object_pose(cloud: SceneCloud, sensed: SensedFurniture) -> Float[np.ndarray, "4 4"]:
-    """`T_world_object`: upright, X out of the front."""
-    # Handles of shut parts know the front better than the body's planes do.
-    ways = [sensed.front]
-    for part in sensed.parts[:6]:
-        way = part.handle[:3, 1] * [1, 1, 0]
-        if part.opening < _AJAR[part.kind] and way @ sensed.front > np.cos(0.1):
-            ways.append(way / np.linalg.norm(way))
-    x = np.median(ways, axis=0) if len(ways) > 2 else sensed.front
-    x = x / np.linalg.norm(x)
-    z = np.array([0.0, 0.0, 1.0])
-    rotation = np.stack([x, np.cross(z, x), z], axis=1)
-    return compose(rotation, np.median(cloud.points, axis=0))
-
-
 class _Shut:
     """A sensed part in the object frame, as if it were shut.
 
@@ -135,7 +120,7 @@ class _Shut:
         axis = to_object[:3, :3] @ sensed.axis
         self.axis = _snapped(axis / np.linalg.norm(axis))
         self.origin = transform(to_object, sensed.origin[None])[0]
-        self.opening = sensed.opening if sensed.opening > _AJAR[sensed.kind] else 0.0
+        self.opening = sensed.opening if sensed.opening > AJAR[sensed.kind] else 0.0
         joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
         back = _motion(joint, -self.opening)
         self.handle = back @ to_object @ sensed.handle
