@@ -5,13 +5,24 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.control.furniture.handle_shape import run_around
+
 # Of what has knobs that turn about the way out of the front; parts of other categories are doors if they turn.
 WITH_KNOBS = frozenset({"dishwasher", "microwave", "oven", "washing_machine"})
 _STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at least
 # Of the handle of a flap: how far from the middle at most, across, and at least, upright, of the panel's half.
 _ACROSS, _UPRIGHT = 0.3, 0.5
+_WIDE = 0.5  # of the panel's width, from which on a level bar is a flap's
 _AT_EDGE = 0.25  # how far from an edge of the panel an upright hinge may be, of the panel's width
 _CORNER = 0.6  # across: beyond it no flap has its handle
+# Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
+# of the handle, and a gap that ends it [m], wider than the shadow of a handle; points that tell.
+_FACE, _STRIP, _GAP, _TELLING = 0.04, 0.10, 0.15, 60
+
+
+def is_straight(axis: Float[np.ndarray, "3"]) -> bool:
+    """Whether an axis, object frame, is upright or level along the front."""
+    return float(np.abs(axis[1:]).max()) > _STRAIGHT
 
 
 def can_be_a_door(
@@ -31,23 +42,52 @@ def can_be_a_door(
     return abs(float(axis[2])) > _STRAIGHT and at_edge
 
 
+def whole_front(
+    points: Float[np.ndarray, "n 3"],
+    front: float,
+    handle: Float[np.ndarray, "4 4"],
+    panel: Float[np.ndarray, "2 3"],
+) -> Float[np.ndarray, "2 3"]:
+    """As much of a panel as is in one piece with what is behind the handle: beyond a gap there is another front.
+
+    Args:
+      points: That face out of the front, object frame [m].
+      front: Of the panel, along X [m].
+      handle: `T_object_handle`, shut.
+      panel: Low and high corner, object frame [m].
+    """
+    found, local = panel.copy(), points - handle[:3, 3]
+    on = (np.abs(points[:, 0] - front) < _FACE) & (points >= panel[0])[:, 1:].all(axis=1)
+    on &= (points <= panel[1])[:, 1:].all(axis=1)
+    for axis in (1, 2):
+        along = local[on & (np.abs(local[:, 3 - axis]) < _STRIP), axis]
+        if len(along) < _TELLING:
+            continue
+        low, high = np.add(run_around(along, _GAP), handle[axis, 3])
+        if low < handle[axis, 3] < high:
+            found[:, axis] = max(panel[0, axis], low), min(panel[1, axis], high)
+    return found
+
+
 def likely_hinge(
-    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"], length: float = 0.0
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """A point of the axis and its direction, positive is opening: along the edge that is farthest from the handle.
 
     Doors turn about the vertical. A flap, whose handle lies level in the middle of an upper or lower edge, turns about
-    the level.
+    the level; one whose bar is wide does so as well, and opens downwards if its bar is near no edge.
 
     Args:
       handle: `T_object_handle`, shut.
       panel: Low and high corner, object frame, between its neighbours and the body's sides [m].
+      length: Of the handle [m]; 0 where it is not known.
     """
     along, away = np.abs(handle[:3, 0]), _away(handle, panel)
     middle, half = panel.mean(axis=0), np.ptp(panel, axis=0) / 2
-    level = along[1] > along[2] and abs(away[1]) < _ACROSS and abs(away[2]) > _UPRIGHT
+    wide = length > _WIDE * 2 * half[1]
+    level = along[1] > along[2] and abs(away[1]) < _ACROSS and (wide or abs(away[2]) > _UPRIGHT)
     across = 2 if level else 1
-    side = -1.0 if away[across] > 0 else 1.0
+    side = -1.0 if away[across] > (-_UPRIGHT if level else 0.0) else 1.0
     origin = np.array([panel[1, 0], middle[1], middle[2]])
     origin[across] = middle[across] + side * half[across]
     axis = np.zeros(3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import product
 from typing import Literal
 
@@ -13,7 +12,12 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.body_shape import body_slices, ends_of
-from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, can_be_a_door, likely_hinge
+from manipose_mj.control.furniture.door_hinge import (
+    WITH_KNOBS,
+    can_be_a_door,
+    likely_hinge,
+    whole_front,
+)
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
 from manipose_mj.control.furniture.object_frame import AJAR, object_pose
@@ -27,8 +31,8 @@ TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
 LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
 _SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
 _PANEL = 0.018  # thickness [m]
-_WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
-_REAR = 0.03  # behind them [m]
+WALL, DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
+REAR = 0.03  # behind them [m]
 _FACING = 0.6  # cosine between normals of the front and X, at least
 # How far points of a panel's plane are from it [m]; points that tell its sides.
 _FACE, _FACE_LEAST = 0.012, 150
@@ -59,7 +63,7 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     bounds = _bounds(points, normals, shut)
     if category not in WITH_KNOBS:
         for part in shut:
-            part.turn_as_doors_do(shut, bounds)
+            part.turn_as_doors_do(shut, bounds, points, normals)
     if any(part.opening == 0.0 for part in shut):
         for part in shut:
             part.meet_front(points, normals, float(bounds[1, 0]))
@@ -127,7 +131,13 @@ class _Shut:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
 
-    def turn_as_doors_do(self, others: Sequence[_Shut], bounds: Float[np.ndarray, "2 3"]) -> None:
+    def turn_as_doors_do(
+        self,
+        others: Sequence[_Shut],
+        bounds: Float[np.ndarray, "2 3"],
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+    ) -> None:
         """Where the estimated hinge is no door's, turn about the likely edge."""
         # What shows open is a door; where its handle is, shut, tells others little.
         if self.kind == "slide" or (self.opening > 0.0 and abs(self.axis[0]) < _KNOBS):
@@ -135,6 +145,10 @@ class _Shut:
         shut = [other for other in others if other.opening == 0.0 or other.kind == "slide"]
         between = _between_neighbours(self, shut, bounds)
         if not can_be_a_door(self.origin, self.axis, self.handle, between):
+            front = _panel_place(points, normals, self) if self.opening == 0.0 else None
+            if front is not None:
+                facing = points[normals[:, 0] > _FACING]
+                between = whole_front(facing, front, self.handle, between)
             self.handle = invert(self.back) @ self.handle
             self.opening, self.back = 0.0, np.eye(4)
             self.origin, self.axis = likely_hinge(self.handle, between)
@@ -278,27 +292,18 @@ def _part(
     )
 
 
-def as_drawer(part: PartModel) -> PartModel:
-    """The same part, known to slide: straight out of the front."""
-    handle, panel = part.part.handle, part.panel
-    assert handle is not None
-    joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, TYPICAL_DRAWER))
-    low, high = panel[0] + [0.0, _WALL, _WALL], panel[1] - [0.0, _WALL, _WALL]
-    low[0], high[0] = panel[0, 0] - TYPICAL_DRAWER, panel[0, 0]
-    cavity = None
-    if (high - low > 0.04).all():
-        cavity = Cavity((low + high) / 2, high - low, moves_with_part=True)
-    return replace(part, part=MovingPart(part.name, joint, handle, cavity), opening=0.0)
-
-
 def _range(part: _Shut, depth: float, category: str) -> float:
     """How far the part may open [m or rad]: as is usual."""
     if part.kind == "slide":
         # The rear of what is deep, or stands at an angle, is out of all cameras' sight.
         return max(DRAWER_SHARE * depth, TYPICAL_DRAWER, part.opening)
-    level = abs(part.axis[2]) < 0.7
-    usual = LEVEL_SWING if level else TYPICAL_SWING.get(category, ANY_SWING)
-    return max(usual, part.opening)
+    return max(usual_swing(part.axis, category), part.opening)
+
+
+def usual_swing(axis: Float[np.ndarray, "3"], category: str) -> float:
+    """How far doors open that turn about such an axis, object frame [rad]."""
+    level = abs(axis[2]) < 0.7
+    return LEVEL_SWING if level else TYPICAL_SWING.get(category, ANY_SWING)
 
 
 def _panel(
@@ -374,12 +379,12 @@ def _cavity(
     high[0] = panel[0, 0]
     if part.kind == "slide":
         low[0] = high[0] - most
-        low[1:] += _WALL
-        high[1:] -= _WALL
+        low[1:] += WALL
+        high[1:] -= WALL
     else:
-        low[0] = bounds[0, 0] + _REAR
-        low[1:] += _DOOR_WALL
-        high[1:] -= _DOOR_WALL
+        low[0] = bounds[0, 0] + REAR
+        low[1:] += DOOR_WALL
+        high[1:] -= DOOR_WALL
     if (high - low < 0.04).any():
         return None
     return Cavity((low + high) / 2, high - low, moves_with_part=part.kind == "slide")

@@ -53,7 +53,7 @@ def _measured(
     if on.sum() < 12:
         usual = np.array([0.10, 0.012, 0.012])
         return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
-    along = _run(local[on, 0], 0.025)
+    along = run_around(local[on, 0], 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
     # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
     across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
@@ -78,8 +78,8 @@ def _measured(
     return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
 
 
-def _run(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
-    """The run of values around 0 without a gap [m]."""
+def run_around(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
+    """The run of values around the one nearest to 0 without a gap [m]."""
     values = np.sort(along)
     low = high = float(values[np.abs(values).argmin()])
     for value in values[values > high]:

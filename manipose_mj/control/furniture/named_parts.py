@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.furniture_fit import as_drawer
 from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.other_kind import as_door, as_drawer
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
 from manipose_mj.failures import StageFailure
 
@@ -35,11 +35,13 @@ def named(
         opened = [i for i in free if parts[i].opening > 0]
         # What shall be shut stands open.
         free = opened if name in expected_open and opened else free
-        index = meant_part(words, [_candidate(parts[i]) for i in free])
+        index = meant_part(words, [_candidate(parts[i]) for i in free], model.category)
         if index is None:
             raise StageFailure("perception", f"no camera shows the {words} of the {model.category}")
         chosen = parts[free[index]]
-        if "drawer" in words.split() and chosen.part.joint.kind == "hinge":
+        if "drawer" not in words.split():
+            chosen = as_door(chosen, model.category, float(model.solid[:, 0, 0].min()))
+        elif chosen.hinged:
             chosen = as_drawer(chosen)
         parts[free[index]] = replace(chosen, part=replace(chosen.part, name=name))
     kept = [part for part in parts if part.name in asked or part.confidence >= _SURE_PART]
@@ -51,7 +53,8 @@ def _candidate(part: PartModel) -> Candidate:
     low, high = part.panel[:, 1]
     middle = abs(float(handle_of(part).origin[1]) - (low + high) / 2) / max(high - low, 0.01)
     _, width, height = np.maximum(part.panel[1] - part.panel[0], 0.01)
-    return Candidate(part.part, part.confidence, 2 * middle, float(height / (height + width)))
+    upright, length = float(height / (height + width)), float(handle_of(part).extents[0])
+    return Candidate(part.part, part.confidence, 2 * middle, upright, length)
 
 
 def handle_of(part: PartModel) -> PoseLabel:

@@ -13,7 +13,7 @@ from manipose_mj.poses import transform
 
 _FAR = 0.02  # a point further off counts as this far [m]
 _STEPS = {"slide": (0.01, 0.002), "hinge": (0.06, 0.01)}  # of the search, coarse and fine
-_BEYOND = {"slide": 0.04, "hinge": 0.25}  # openings beyond the usual that are looked at
+_BEYOND = {"slide": 0.04, "hinge": 0.5}  # openings beyond the usual that are looked at
 _WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut

@@ -18,20 +18,23 @@ _UNSURE = 1.0  # what no confidence costs, in places
 _LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
 _FITS = 1.0  # places off, below which words fit
 _SHARE = 2.0  # how many places the whole height, or width, counts for
+# Of ovens: what it costs to be a knob, to slide, and to be below, in places; handles that are no shorter are bars [m].
+_KNOB, _SLIDES, _BELOW, _BAR = 1.5, 0.3, 1.0, 0.06
 
 
 @dataclass(frozen=True)
 class Candidate:
     """A part that was found. Attributes: part; confidence; beside: how far its handle is from its panel's middle, of
-    half its width; upright: the height of its panel, of height and width together."""
+    half its width; upright: the height of its panel, of height and width together; length: of its handle [m]."""
 
     part: MovingPart
     confidence: float
     beside: float = 0.5
     upright: float = 0.5
+    length: float = 0.1
 
 
-def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
+def meant_part(words: str, candidates: Sequence[Candidate], category: str = "") -> int | None:
     """Index of the part that words mean; None where there is none.
 
     One that would be called so itself, or else the one that comes nearest: a part may have been missed,
@@ -40,12 +43,19 @@ def meant_part(words: str, candidates: Sequence[Candidate]) -> int | None:
     Args:
       words: As of `part_words`.
       candidates: Of one piece of furniture.
+      category: Of it.
     """
-    for least in _LEAST:
+    the_oven_door = category == "oven" and words == "door"
+    for least in _LEAST[-1:] if the_oven_door else _LEAST:
         chosen = [i for i, candidate in enumerate(candidates) if candidate.confidence >= least]
         parts = [candidates[i].part for i in chosen]
         costs = [
-            _cost(words, parts, candidates[i]) + _UNSURE * (1 - candidates[i].confidence)
+            (
+                _oven_cost([candidates[k] for k in chosen], candidates[i])
+                if the_oven_door
+                else _cost(words, parts, candidates[i])
+            )
+            + _UNSURE * (1 - candidates[i].confidence)
             for i in chosen
         ]
         if costs and (min(costs) < _FITS or least == _LEAST[-1]):
@@ -80,6 +90,20 @@ def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> floa
     if noun == "door":
         looks, shape = 1 - looks, 1 - shape
     return wrong * (_OTHER_KIND + _LOOKS * looks + _SHAPE * shape) + row_cost + column_cost
+
+
+def _oven_cost(candidates: Sequence[Candidate], candidate: Candidate) -> float:
+    """How far a part is from the only door of an oven, in places.
+
+    That has a bar, above what is kept below it; knobs are no handles. A wide, low front says nothing.
+    """
+    bars = [float(_handle(each.part)[2]) for each in candidates if each.length >= _BAR]
+    slides = _SLIDES * (candidate.part.joint.kind == "slide")
+    if candidate.length < _BAR:
+        return _KNOB + slides
+    low, high = min(bars), max(bars)
+    above = (float(_handle(candidate.part)[2]) - low) / (high - low) if high > low else 1.0
+    return slides + _BELOW * (1 - above)
 
 
 def _place_cost(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge
+from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
 from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose
 
@@ -51,3 +51,22 @@ def test_a_door_turns_about_the_edge_that_is_farthest_from_its_handle(
 def test_hinges_of_doors_lie_in_the_front_at_an_edge(axis, across, place, can):
     origin, axis = np.array([0.2, across, 0.3]), axis / np.linalg.norm(axis)
     assert can_be_a_door(origin, axis, handle(*place), PANEL) is can
+
+
+def test_a_wide_level_bar_is_a_flaps_that_opens_downwards():
+    pose = handle(-0.1, 0.4, ACROSS_FRONT)  # near no edge
+    assert abs(likely_hinge(pose, PANEL, length=0.12)[1][2]) == 1.0
+    origin, axis = likely_hinge(pose, PANEL, length=0.3)
+    np.testing.assert_allclose(axis, Y)
+    assert origin[2] == pytest.approx(PANEL[0, 2])
+
+
+@pytest.mark.parametrize("curved", [0.0, 0.02])
+def test_beyond_a_gap_there_is_another_front(curved):
+    y, z = (grid.ravel() for grid in np.mgrid[-0.3:0.6:0.01, 0.1:0.6:0.01])
+    x = 0.2 - curved * ((y + 0.1) / 0.2) ** 2
+    seen = np.column_stack([x, y, z])[(y < 0.1) | (y > 0.4)]  # between them there is room for legs
+    between = np.array([[0.0, -0.3, 0.1], [0.2, 0.6, 0.6]])
+    found = whole_front(seen, 0.2, handle(0.05, 0.5), between)
+    np.testing.assert_allclose(found, [[0.0, -0.3, 0.1], [0.2, 0.1, 0.6]], atol=0.011)
+    np.testing.assert_allclose(whole_front(seen[:40], 0.2, handle(0.05, 0.5), between), between)

@@ -29,7 +29,7 @@ def test_an_open_door_faces_where_its_panel_does(thought):
     handle = rotation_about(-Z, opening) @ (shut - origin) + origin
     part = sensed(
         "hinge",
-        [0, 0, 0],
+        [0.0, 0.0, 0.0],
         handle=compose(rotation_about(-Z, thought) @ UP_FRONT, handle),
         origin=origin,
         axis=-Z,

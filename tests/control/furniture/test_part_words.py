@@ -70,3 +70,13 @@ def test_a_wide_front_is_a_drawers_though_all_were_taken_for_doors():
     ]
     assert meant_part("drawer", candidates) == 2
     assert meant_part("left door", candidates) == 1
+
+
+def test_the_door_of_an_oven_is_above_a_drawer_and_below_its_knobs():
+    below = Candidate(part("below", 0.0, 0.1, "hinge"), 0.2, 0.0, 0.1, 0.6)
+    above = Candidate(part("above", 0.0, 0.7), 0.15, 0.0, 0.3, 0.6)
+    knob = Candidate(part("knob", 0.3, 0.9, "hinge"), 0.5, 0.5, 0.6, 0.02)
+    assert meant_part("door", [below, above, knob], "oven") == 1
+    assert meant_part("door", [knob], "oven") == 0
+    # In a cupboard a wide, low front is a drawer's, wherever it is.
+    assert meant_part("door", [below, above], "cabinet") == 0

@@ -1,0 +1,61 @@
+"""Parts that words call by another kind than was seen: a drawer that was taken for a door, a door for a drawer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import Cavity
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.door_hinge import is_straight, likely_hinge
+from manipose_mj.control.furniture.furniture_fit import (
+    DOOR_WALL,
+    REAR,
+    TYPICAL_DRAWER,
+    WALL,
+    usual_swing,
+)
+from manipose_mj.control.furniture.furniture_model import PartModel
+
+_SMALLEST = 0.04  # sides of a cavity [m]
+
+
+def as_drawer(part: PartModel) -> PartModel:
+    """The same part, known to slide: straight out of the front."""
+    handle, panel = part.part.handle, part.panel
+    assert handle is not None
+    joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, TYPICAL_DRAWER))
+    low, high = panel[0] + [0.0, WALL, WALL], panel[1] - [0.0, WALL, WALL]
+    low[0], high[0] = panel[0, 0] - TYPICAL_DRAWER, panel[0, 0]
+    cavity = _between(low, high, moves=True)
+    return replace(part, part=replace(part.part, joint=joint, cavity=cavity), opening=0.0)
+
+
+def as_door(part: PartModel, category: str, rear: float) -> PartModel:
+    """The same part, known to turn: about a hinge that a door can have.
+
+    Args:
+      part: That stands shut, or was taken to slide.
+      category: Of the furniture.
+      rear: Its back, along X [m].
+    """
+    handle, joint, panel = part.part.handle, part.part.joint, part.panel
+    assert handle is not None
+    if part.hinged and (part.opening > 0.0 or is_straight(joint.axis)):
+        return part
+    origin, axis = likely_hinge(handle.pose, panel, float(handle.extents[0]))
+    hinge = Joint("hinge", origin, axis, (0.0, usual_swing(axis, category)))
+    low, high = panel[0] + [0.0, DOOR_WALL, DOOR_WALL], panel[1] - [0.0, DOOR_WALL, DOOR_WALL]
+    low[0], high[0] = rear + REAR, panel[0, 0]
+    cavity = _between(low, high, moves=False)
+    return replace(part, part=replace(part.part, joint=hinge, cavity=cavity), opening=0.0)
+
+
+def _between(
+    low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], *, moves: bool
+) -> Cavity | None:
+    if (high - low < _SMALLEST).any():
+        return None
+    return Cavity((low + high) / 2, high - low, moves_with_part=moves)
