@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.furniture.handle_shape import run_around
+from manipose_mj.control.furniture.shapes.handle_shape import run_around
 
 # Of what has knobs that turn about the way out of the front; parts of other categories are doors if they turn.
 WITH_KNOBS = frozenset({"dishwasher", "microwave", "oven", "washing_machine"})

@@ -12,7 +12,6 @@ from jaxtyping import Bool, Float
 
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import seen_open
@@ -25,6 +24,7 @@ from manipose_mj.control.furniture.scene_cloud import (
     hidden_from,
     seen_past,
 )
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.stops import Stops, Swings
 from manipose_mj.control.furniture.swung_out import (
     OpenDoor,

@@ -11,18 +11,18 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.door_hinge import (
     WITH_KNOBS,
     can_be_a_door,
     likely_hinge,
     whole_front,
 )
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.handle_shape import handle_boxes, handle_label
 from manipose_mj.control.furniture.object_frame import AJAR, object_pose
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.body_shape import body_slices, ends_of
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import handle_boxes, handle_label
 from manipose_mj.poses import compose, invert, transform
 
 # How far parts open in the median of the training furniture: of the depth, [m]; [rad].

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.other_kind import as_door, as_drawer
 from manipose_mj.control.furniture.part_words import Candidate, meant_part
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.failures import StageFailure
 
 _SURE_PART = 0.15  # confidence of parts that nobody asked for

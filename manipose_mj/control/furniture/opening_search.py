@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
-from manipose_mj.control.furniture.furniture_model import PartModel
+from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 from manipose_mj.poses import transform
 
 _FAR = 0.02  # a point further off counts as this far [m]

@@ -17,7 +17,7 @@ from manipose_mj.control.furniture.furniture_fit import (
     WALL,
     usual_swing,
 )
-from manipose_mj.control.furniture.furniture_model import PartModel
+from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 
 _SMALLEST = 0.04  # sides of a cavity [m]
 

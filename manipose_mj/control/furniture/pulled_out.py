@@ -8,10 +8,14 @@ import numpy as np
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, handle_boxes, handle_label
 from manipose_mj.control.furniture.other_kind import as_drawer
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import (
+    ACROSS_FRONT,
+    handle_boxes,
+    handle_label,
+)
 from manipose_mj.poses import compose, invert, transform
 
 _FACING = 0.75  # cosine between normals of a drawer's front and X, at least

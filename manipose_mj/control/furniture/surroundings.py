@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
-from manipose_mj.control.furniture.boxes import Boxes, voxel_boxes
+from manipose_mj.control.furniture.shapes.boxes import Boxes, voxel_boxes
 
 _REACH = np.array([[-0.9, -1.3, -0.25], [1.4, 1.3, 1.3]])  # of what matters, world frame [m]
 _FOOT = 0.18  # around the robot's base: points there may be the robot's [m]

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose, invert, rotation_about, transform
 
 _LEAST_OUT = 0.06  # how far a door stands out of the body: handles stand out less [m]

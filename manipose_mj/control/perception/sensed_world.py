@@ -10,10 +10,10 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float
 
-from manipose_mj.control.furniture.boxes import Boxes, no_boxes
 from manipose_mj.control.furniture.estimated_furniture import EstimatedFurniture
 from manipose_mj.control.furniture.part_sensing import PartSensor, sense_parts
 from manipose_mj.control.furniture.scene_cloud import SceneViews
+from manipose_mj.control.furniture.shapes.boxes import Boxes, no_boxes
 from manipose_mj.control.furniture.surroundings import surrounding_boxes
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.estimated_scene import PREFIX, add_object, without_looks

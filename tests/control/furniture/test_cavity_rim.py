@@ -8,11 +8,11 @@ import pytest
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.boxes import no_boxes
 from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.boxes import no_boxes
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import SymmetryGroup, transform
 
 # An oven's opening in a front at 0.2, 2 cm behind the front of its door; its panel as first guessed is larger.

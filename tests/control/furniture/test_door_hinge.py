@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
-from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
+from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose
 
 PANEL = np.array([[0.18, -0.3, 0.1], [0.20, 0.1, 0.6]])

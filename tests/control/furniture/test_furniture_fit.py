@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
 from manipose_mj.poses import compose, rotation_about
 from tests.control.furniture.synthetic import FRONT, HALF, body, cloud, door, rectangle
 

@@ -10,12 +10,12 @@ from scipy.spatial import cKDTree
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
-from manipose_mj.control.furniture.handle_shape import handle_label
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import found_opening, misfit
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.boxes import no_boxes
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import handle_label
 from manipose_mj.poses import compose, transform
 
 FRONT = 0.2

@@ -8,10 +8,10 @@ import pytest
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.furniture_model import PartModel
-from manipose_mj.control.furniture.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.control.furniture.other_kind import as_door, as_drawer
+from manipose_mj.control.furniture.shapes.boxes import no_boxes
+from manipose_mj.control.furniture.shapes.furniture_model import PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import SymmetryGroup
 
 X, Y, Z = np.eye(3)

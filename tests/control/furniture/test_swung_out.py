@@ -9,9 +9,9 @@ import pytest
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.boxes import no_boxes
-from manipose_mj.control.furniture.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
+from manipose_mj.control.furniture.shapes.boxes import no_boxes
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.swung_out import as_seen_open, swung_out, with_open_door
 from manipose_mj.poses import compose, rotation_about
 from tests.control.furniture.synthetic import FRONT, HALF, HEIGHT, body, cloud, door, rectangle

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.boxes import Boxes
+from manipose_mj.control.furniture.shapes.boxes import Boxes
 from manipose_mj.poses import SymmetryGroup, invert, transform
 
 # Rotations of a level and of an upright bar, X along the bar and Y out of the front.

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
-from manipose_mj.control.furniture.boxes import Boxes, without
+from manipose_mj.control.furniture.shapes.boxes import Boxes, without
 from manipose_mj.poses import compose, rotation_about
 
 _TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]

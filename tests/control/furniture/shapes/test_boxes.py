@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.boxes import voxel_boxes, without
+from manipose_mj.control.furniture.shapes.boxes import voxel_boxes, without
 from manipose_mj.control.furniture.surroundings import surrounding_boxes
 
 UNIT = np.array([[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.furniture.boxes import Boxes
+from manipose_mj.control.furniture.shapes.boxes import Boxes
 
 _SLICE = 0.05  # height of what the body is cut into [m]
 _ALIKE = 0.02  # slices whose sides differ by less are one [m]
@@ -27,9 +27,14 @@ def ends_of(
 
 
 def body_slices(points: Float[np.ndarray, "n 3"], bounds: Float[np.ndarray, "2 3"]) -> Boxes:
-    """The body in level slices, each from its front to the back: a plinth stays behind the front."""
+    """The body in level slices, each from its front to the back: a plinth stays behind the front.
+
+    One box where nothing of it shows.
+    """
     body = (points[:, 0] < bounds[1, 0] + 0.004) & (points[:, 0] > bounds[0, 0] - 0.02)
     points = points[body]
+    if not len(points):
+        return bounds[None]
     bottom, top = float(points[:, 2].min()), float(bounds[1, 2])
     count = max(int(np.ceil((top - bottom) / _SLICE)), 1)
     edges = np.linspace(bottom, top, count + 1)
