@@ -31,8 +31,8 @@ TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
 LEVEL_SWING, ANY_SWING = 1.57, 1.75  # of other categories [rad]
 _SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
 _PANEL = 0.018  # thickness [m]
-WALL, DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
-REAR = 0.03  # behind them [m]
+_WALL, _DOOR_WALL = 0.022, 0.03  # around cavities that were not seen [m]
+_REAR = 0.03  # behind them [m]
 _FACING = 0.6  # cosine between normals of the front and X, at least
 # How far points of a panel's plane are from it [m]; points that tell its sides.
 _FACE, _FACE_LEAST = 0.012, 150
@@ -281,7 +281,7 @@ def _part(
     depth = float(bounds[1, 0] - bounds[0, 0])
     joint = Joint(part.kind, part.origin, part.axis, (0.0, _range(part, depth, category)))
     name = f"part_{number}"
-    cavity = _cavity(part, panel, bounds, joint.range[1])
+    cavity = cavity_behind(panel, part.kind, joint.range[1], float(bounds[0, 0]))
     return PartModel(
         part=MovingPart(name, joint, handle, cavity),
         panel=panel,
@@ -368,23 +368,22 @@ def _half_handle(part: _Shut) -> Float[np.ndarray, "3"]:
     return np.abs(part.handle[:3, 0]) * 0.05 + 0.01
 
 
-def _cavity(
-    part: _Shut,
-    panel: Float[np.ndarray, "2 3"],
-    bounds: Float[np.ndarray, "2 3"],
-    most: float,
+def cavity_behind(
+    panel: Float[np.ndarray, "2 3"], kind: Literal["slide", "hinge"], most: float, rear: float
 ) -> Cavity | None:
-    """What may be behind a panel: a guess until it is open."""
-    low, high = panel[0].copy(), panel[1].copy()
+    """What may be behind a panel: a guess until it is open.
+
+    Args:
+      panel: Low and high corner, object frame [m].
+      kind: Of the part's joint.
+      most: How far a part that slides opens [m].
+      rear: Of the furniture, along X [m].
+    """
+    slides = kind == "slide"
+    wall = np.array([0.0, 1.0, 1.0]) * (_WALL if slides else _DOOR_WALL)
+    low, high = panel[0] + wall, panel[1] - wall
     high[0] = panel[0, 0]
-    if part.kind == "slide":
-        low[0] = high[0] - most
-        low[1:] += WALL
-        high[1:] -= WALL
-    else:
-        low[0] = bounds[0, 0] + REAR
-        low[1:] += DOOR_WALL
-        high[1:] -= DOOR_WALL
+    low[0] = high[0] - most if slides else rear + _REAR
     if (high - low < 0.04).any():
         return None
-    return Cavity((low + high) / 2, high - low, moves_with_part=part.kind == "slide")
+    return Cavity((low + high) / 2, high - low, moves_with_part=slides)

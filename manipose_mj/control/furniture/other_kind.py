@@ -5,21 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
-from manipose_mj.assets.asset import Cavity
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.door_hinge import is_straight, likely_hinge
-from manipose_mj.control.furniture.furniture_fit import (
-    DOOR_WALL,
-    REAR,
-    TYPICAL_DRAWER,
-    WALL,
-    usual_swing,
-)
+from manipose_mj.control.furniture.furniture_fit import TYPICAL_DRAWER, cavity_behind, usual_swing
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
-
-_SMALLEST = 0.04  # sides of a cavity [m]
 
 
 def as_drawer(part: PartModel) -> PartModel:
@@ -27,9 +17,7 @@ def as_drawer(part: PartModel) -> PartModel:
     handle, panel = part.part.handle, part.panel
     assert handle is not None
     joint = Joint("slide", handle.origin, np.array([1.0, 0.0, 0.0]), (0.0, TYPICAL_DRAWER))
-    low, high = panel[0] + [0.0, WALL, WALL], panel[1] - [0.0, WALL, WALL]
-    low[0], high[0] = panel[0, 0] - TYPICAL_DRAWER, panel[0, 0]
-    cavity = _between(low, high, moves=True)
+    cavity = cavity_behind(panel, "slide", TYPICAL_DRAWER, 0.0)
     return replace(part, part=replace(part.part, joint=joint, cavity=cavity), opening=0.0)
 
 
@@ -47,15 +35,5 @@ def as_door(part: PartModel, category: str, rear: float) -> PartModel:
         return part
     origin, axis = likely_hinge(handle.pose, panel, float(handle.extents[0]))
     hinge = Joint("hinge", origin, axis, (0.0, usual_swing(axis, category)))
-    low, high = panel[0] + [0.0, DOOR_WALL, DOOR_WALL], panel[1] - [0.0, DOOR_WALL, DOOR_WALL]
-    low[0], high[0] = rear + REAR, panel[0, 0]
-    cavity = _between(low, high, moves=False)
+    cavity = cavity_behind(panel, "hinge", 0.0, rear)
     return replace(part, part=replace(part.part, joint=hinge, cavity=cavity), opening=0.0)
-
-
-def _between(
-    low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], *, moves: bool
-) -> Cavity | None:
-    if (high - low < _SMALLEST).any():
-        return None
-    return Cavity((low + high) / 2, high - low, moves_with_part=moves)
