@@ -28,7 +28,9 @@ from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel,
 from manipose_mj.control.furniture.stops import Stops, Swings
 from manipose_mj.control.furniture.swung_out import (
     OpenDoor,
+    as_large_as,
     as_seen_open,
+    open_door_of,
     swung_out,
     with_open_door,
 )
@@ -137,13 +139,16 @@ class EstimatedFurniture:
         for name in sorted(self._expected_open):
             if "drawer" in asked.get(name, "").split():
                 model = (pulled_out(model, cloud, name) if name in shut else None) or model
-            elif (door := swung_out(model, cloud)) is not None:
-                sensed = with_open_door(sensed, door)
+            elif (found := open_door_of(cloud, sensed, model)) is not None:
+                door = found[1]
+                sensed = with_open_door(*found)
                 model = fit_furniture(cloud, sensed, model.category)
                 model = named(model, asked, self._expected_open)
                 part = next(part for part in model.parts if part.name == name)
                 if part.opening > 0.0:
                     self._sure[name] = part.part.joint
+                    if self._is_of(door, part, model.pose):
+                        model = model.with_part(as_large_as(part, door))
         return model
 
     @property
@@ -292,7 +297,7 @@ class EstimatedFurniture:
         for part in model.parts:
             if part.opening > 0.0:
                 found = part.at(found_opening(part, points, hidden))
-                if door is not None and part.hinged and self._is_of(door, part):
+                if door is not None and part.hinged and self._is_of(door, part, model.pose):
                     panel = as_seen_open(part, door, model.pose)
                     panel = panel.at(found_opening(panel, points, hidden))
                     # What the hand felt may be better: a pane behind its frame looks turned.
@@ -311,10 +316,10 @@ class EstimatedFurniture:
             isinstance(goal, OpenGoal) and goal.part == part.name for goal in goals
         )
 
-    def _is_of(self, door: OpenDoor, part: PartModel) -> bool:
-        """Whether a door that stands open is this part: it carries its handle."""
-        assert self.model is not None
-        handle = self.model.pose @ part.motion(part.opening) @ handle_of(part).pose
+    @staticmethod
+    def _is_of(door: OpenDoor, part: PartModel, pose: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether a door that stands open is this part: it carries its handle; `pose` is `T_world_object`."""
+        handle = pose @ part.motion(part.opening) @ handle_of(part).pose
         return door.carries(handle[:3, 3])
 
     def _part(self, name: str | None) -> PartModel | None:

@@ -7,18 +7,16 @@ from jaxtyping import Float
 
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.walls import squareness, walls_of
 from manipose_mj.poses import compose
 
 AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m, rad]
 _SAME_WAY = np.cos(0.1)  # cosine between the ways that two parts face, at least
 _UPRIGHT = 0.35  # cosine between normals of walls and the vertical, at most
-_WALL = 0.985  # cosine between normals of a wall and the way it faces, at least
-_CELL, _BIN = 0.02, 0.005  # in which points are thinned out, and places of walls are counted [m]
-_FEWEST = 50  # points of walls that face one way
-_TURNS = np.radians(np.arange(-30.0, 30.5, 1.0))  # that are tried
-_FINE = np.radians(np.arange(-1.5, 1.55, 0.1))  # and then around the best of them
+_CELL = 0.02  # in which points are thinned out [m]
+_TURNS = np.radians(np.arange(-45.0, 45.05, 0.1))  # that are tried
 _NEAR = np.radians(1.5)  # turns no larger than this change nothing
-_CLEARLY = 2.0  # how much squarer the walls have to be
+_CLEARLY = 1.3  # how much squarer the walls have to be
 
 
 def object_pose(cloud: SceneCloud, sensed: SensedFurniture) -> Float[np.ndarray, "4 4"]:
@@ -56,30 +54,13 @@ def _square_to_walls(x: Float[np.ndarray, "3"], cloud: SceneCloud) -> Float[np.n
     points, normals = cloud.points[upright], cloud.normals[upright]
     rows = np.unique(np.floor(points / _CELL).astype(int), axis=0, return_index=True)[1]
     flat, faces = (rows_of[rows] @ np.stack([x, y], axis=1) for rows_of in (points, normals))
-    scores = np.array([_squareness(flat, faces, turn) for turn in _TURNS])
+    lengths = np.maximum(np.linalg.norm(faces, axis=1, keepdims=True), 1e-9)
+    walls = walls_of(flat, faces / lengths)
+    if not walls:
+        return x
+    scores = squareness(walls, _TURNS)
     now, best = scores[np.abs(_TURNS) <= _NEAR].max(), int(scores.argmax())
     if scores[best] <= _CLEARLY * now:
         return x
-    turns = _TURNS[best] + _FINE
-    turn = turns[int(np.argmax([_squareness(flat, faces, turn) for turn in turns]))]
+    turn = _TURNS[best]
     return np.cos(turn) * x + np.sin(turn) * y
-
-
-def _squareness(
-    flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"], turn: float
-) -> float:
-    """How much of what faces along a turned axis is in few planes, and of what faces across it: of both, or nothing."""
-    way = np.array([np.cos(turn), np.sin(turn)])
-    planes = [_in_planes(flat, faces, axis) for axis in (way, np.array([-way[1], way[0]]))]
-    return float(np.sqrt(np.prod(planes)))
-
-
-def _in_planes(
-    flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"], axis: Float[np.ndarray, "2"]
-) -> float:
-    """Sum of the squares of how many points of walls across an axis are at each place along it."""
-    places = flat[np.abs(faces @ axis) > _WALL] @ axis
-    if len(places) < _FEWEST:
-        return 0.0
-    counts = np.histogram(places, np.arange(places.min() - _BIN, places.max() + 2 * _BIN, _BIN))[0]
-    return float((np.convolve(counts, [0.5, 1.0, 0.5], mode="same") ** 2).sum())

@@ -11,6 +11,9 @@ from manipose_mj.control.furniture.door_hinge import is_straight, likely_hinge
 from manipose_mj.control.furniture.furniture_fit import TYPICAL_DRAWER, cavity_behind, usual_swing
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 
+# Cosine between a hinge and the way out of the front, from which on a part would turn as a knob does.
+_AS_KNOBS = 0.7
+
 
 def as_drawer(part: PartModel) -> PartModel:
     """The same part, known to slide: straight out of the front."""
@@ -31,7 +34,8 @@ def as_door(part: PartModel, category: str, rear: float) -> PartModel:
     """
     handle, joint, panel = part.part.handle, part.part.joint, part.panel
     assert handle is not None
-    if part.hinged and (part.opening > 0.0 or is_straight(joint.axis)):
+    turns = part.hinged and abs(float(joint.axis @ handle.rotation[:, 1])) < _AS_KNOBS
+    if turns and (part.opening > 0.0 or is_straight(joint.axis)):
         return part
     origin, axis = likely_hinge(handle.pose, panel, float(handle.extents[0]))
     hinge = Joint("hinge", origin, axis, (0.0, usual_swing(axis, category)))

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.control.furniture.door_line import DoorLine, longest_line
+from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
@@ -17,7 +19,9 @@ _LEAST_OUT = 0.06  # how far a door stands out of the body: handles stand out le
 _ALONG = 0.4  # cosine between normals of a door and its hinge, at most
 _PLANE = 0.012  # how far points of a door are from its plane [m]
 _LEAST, _SMALLEST = 200, 0.08  # points of a door; its sides [m]
-_AJAR, _WIDEST = 0.5, 2.9  # openings at which a door stands out [rad]
+_AJAR, _WIDEST = 0.5, 3.3  # openings at which a door stands out, or beside the body [rad]
+# Of a door that turned by about half a turn: how far beside the body, and how little behind the front, its points are [m].
+_BESIDE_BODY, _NOT_BEHIND = 0.03, 0.05
 # Between the faces of a door [m]: where neither both show nor the rim that it shuts against, at least, at most.
 _THICKNESS, _THINNEST, _THICKEST = 0.018, 0.008, 0.05
 _ONE_FACE = 0.006  # how far points of a face are from it [m]
@@ -32,39 +36,11 @@ _HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
 _HANDLE_LEAST = 30  # such points
 _BESIDE, _BEHIND_PANEL = 0.03, 0.06  # how far beside and behind it estimates have handles [m]
 _FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
-_TRIES = 200
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A door as seen along its hinge. Attributes: middle, a point; way, out of the body; both along X and across `(2,)`;
-    inwards: sign of the way from hinge to free edge, across, of the shut door."""
-
-    middle: Float[np.ndarray, "2"]
-    way: Float[np.ndarray, "2"]
-    inwards: float = 1.0
-
-    @property
-    def outwards(self) -> Float[np.ndarray, "2"]:
-        """Normal of the face that is the front's when the door is shut."""
-        return self.inwards * np.array([self.way[1], -self.way[0]])
-
-    @property
-    def opening(self) -> float:
-        """Of the door [rad]."""
-        return float(np.arctan2(self.way[0], self.way[1] * self.inwards))
-
-    def before(self, flat: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n"]:
-        """How far points are before the line, outwards [m]."""
-        return (flat - self.middle) @ self.outwards
-
-    def moved(self, outwards: float) -> _Line:
-        """The same, further outwards [m]."""
-        return _Line(self.middle + outwards * self.outwards, self.way, self.inwards)
-
-    def across_at(self, x: float) -> float:
-        """Where it is at a place along X [m]."""
-        return float(self.middle[1] + self.way[1] / self.way[0] * (x - self.middle[0]))
+# Of what a door shuts: in which points are counted, what is its rim, how far walls are from its place [m].
+_CELL, _RIM, _WALL = 0.02, 0.03, 0.015
+_NEAR_DOOR = np.array([0.1, 0.05, 0.05])  # of a door, with its handle [m]
+_MOST_WALLED, _MOST_STRAY = 0.5, 0.03
+_QUARTERS = (0.0, np.pi / 2, -np.pi / 2)  # by which the front may have been mistaken [rad]
 
 
 @dataclass(frozen=True)
@@ -74,7 +50,7 @@ class _Swung:
 
     on: Bool[np.ndarray, "n"]
     across: int
-    line: _Line
+    line: DoorLine
     hinge: Float[np.ndarray, "2"]
     thickness: float
 
@@ -88,12 +64,21 @@ class OpenDoor:
       panel: Low and high corner, shut, object frame [m].
       back: `T_object_world`, which shuts it.
       handle_seen: Whether points stand out of the panel where the handle is, otherwise a guess.
+      walled: Share of what it shuts where there is a wall.
+      stray: Share of all points that are before the front, and not near the door.
     """
 
     sensed: SensedPart
     panel: Float[np.ndarray, "2 3"]
     back: Float[np.ndarray, "4 4"]
     handle_seen: bool
+    walled: float
+    stray: float
+
+    @property
+    def fits(self) -> bool:
+        """Whether it can be a door of the front; otherwise a side of the body was taken for the front."""
+        return self.walled < _MOST_WALLED and self.stray < _MOST_STRAY
 
     def carries(self, place: Float[np.ndarray, "3"]) -> bool:
         """Whether a place, world frame [m], is on its front, as a handle is."""
@@ -114,13 +99,25 @@ def swung_out(model: FurnitureModel, cloud: SceneCloud) -> OpenDoor | None:
     """
     points = transform(invert(model.pose), cloud.points)
     normals = cloud.normals @ model.pose[:3, :3]
-    # Doors turn about the vertical, flaps about the level.
-    found = [_swung(points, normals, model.front, across) for across in (1, 2)]
-    swung = max(
-        (each for each in found if each is not None), key=lambda each: each.on.sum(), default=None
-    )
-    if swung is None:
-        return None
+    standing = points[:, 0] > model.front + _LEAST_OUT
+    # Doors turn about the vertical, flaps about the level; what turned by half a turn stands beside the body.
+    ways = [(1, standing), (2, standing), (1, _beside_body(points[:, :2], model.front))]
+    doors: list[tuple[bool, int, OpenDoor]] = []
+    for across, out in ways:
+        swung = _swung(points, normals, model.front, across, out)
+        if swung is not None:
+            door = _opened(model.pose, points, normals, swung)
+            doors.append((door.fits, int(swung.on.sum()), door))
+    return max(doors, key=lambda each: each[:2])[2] if doors else None
+
+
+def _opened(
+    pose: Float[np.ndarray, "4 4"],
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    swung: _Swung,
+) -> OpenDoor:
+    """The door of a line, of furniture at `T_world_object`."""
     inwards, opening = swung.line.inwards, swung.line.opening
     axis, origin = np.zeros(3), np.zeros(3)
     axis[3 - swung.across] = inwards if swung.across == 2 else -inwards
@@ -132,14 +129,41 @@ def swung_out(model: FurnitureModel, cloud: SceneCloud) -> OpenDoor | None:
     panel[1, 0] = swung.hinge[0] + swung.thickness
     handle, seen = _handle_guess(shut, panel, swung)
     sensed = SensedPart(
-        handle=model.pose @ motion @ handle,
+        handle=pose @ motion @ handle,
         kind="hinge",
-        origin=transform(model.pose, origin[None])[0],
-        axis=model.pose[:3, :3] @ axis,
+        origin=transform(pose, origin[None])[0],
+        axis=pose[:3, :3] @ axis,
         opening=opening,
         confidence=1.0,
     )
-    return OpenDoor(sensed, panel, invert(model.pose @ motion), seen)
+    walled = _walled(points[~swung.on], normals[~swung.on], panel)
+    near = (np.abs(shut - panel.mean(axis=0)) < np.ptp(panel, axis=0) / 2 + _NEAR_DOOR).all(axis=1)
+    stray = float(((points[:, 0] > panel[1, 0] + _LEAST_OUT) & ~near).mean())
+    return OpenDoor(sensed, panel, invert(pose @ motion), seen, walled, stray)
+
+
+def open_door_of(
+    cloud: SceneCloud, sensed: SensedFurniture, model: FurnitureModel
+) -> tuple[SensedFurniture, OpenDoor] | None:
+    """A door that stands open, and what was sensed with the front where that door is; None where none shows.
+
+    Args:
+      cloud: Of the furniture, with normals.
+      sensed: Its front and parts: the front may be a side.
+      model: What they were fitted to.
+    """
+    first = None
+    for quarter in _QUARTERS:
+        turned = sensed
+        if quarter:
+            front = rotation_about(np.array([0.0, 0.0, 1.0]), quarter) @ sensed.front
+            turned = replace(sensed, front=front)
+            model = fit_furniture(cloud, turned, model.category)
+        door = swung_out(model, cloud)
+        if door is not None and door.fits:
+            return turned, door
+        first = first or (None if door is None else (turned, door))
+    return first
 
 
 def with_open_door(sensed: SensedFurniture, door: OpenDoor) -> SensedFurniture:
@@ -165,16 +189,25 @@ def as_seen_open(part: PartModel, door: OpenDoor, pose: Float[np.ndarray, "4 4"]
     return moved.opening_to(max(joint.range[1], sensed.opening))
 
 
+def as_large_as(part: PartModel, door: OpenDoor) -> PartModel:
+    """A door at least as large as its panel shows, which handles of neighbours may have cut short."""
+    panel = part.panel.copy()
+    panel[0, 1:] = np.minimum(panel[0, 1:], door.panel[0, 1:])
+    panel[1, 1:] = np.maximum(panel[1, 1:], door.panel[1, 1:])
+    return replace(part, panel=panel)
+
+
 def _swung(
     points: Float[np.ndarray, "n 3"],
     normals: Float[np.ndarray, "n 3"],
     front: float,
     across: int,
+    out: Bool[np.ndarray, "n"],
 ) -> _Swung | None:
-    """A door about the axis that neither X nor `across` is: a line of points, seen along that axis."""
-    out = (points[:, 0] > front + _LEAST_OUT) & (np.abs(normals[:, 3 - across]) < _ALONG)
+    """A door about the axis that neither X nor `across` is: of the points `out` there, a line, seen along that axis."""
     flat, faces = points[:, [0, across]], normals[:, [0, across]]
-    line = _line(flat[out]) if out.sum() >= _LEAST else None
+    out = out & (np.abs(normals[:, 3 - across]) < _ALONG)
+    line = longest_line(flat[out]) if out.sum() >= _LEAST else None
     if line is None:
         return None
     rest = np.abs(line.before(flat)) > 2 * _PLANE
@@ -184,6 +217,7 @@ def _swung(
     if body.sum() < _LEAST:
         return None
     sides = np.percentile(points[body, across], [1, 99])
+    line = line.away_from(sides)
     line = replace(line, inwards=_inwards(line, flat[out], front, sides, across))
     line, thickness = _outer_face(line, flat[out], faces[out], _rim_depth(facing, front))
     if not _AJAR < line.opening < _WIDEST:
@@ -192,21 +226,31 @@ def _swung(
     rim = np.abs(facing - (front - thickness)) < 2 * _BIN
     inner = line.moved(-thickness)
     x = front - thickness if rim.sum() > _LEAST else front
-    hinge = np.array([x, inner.across_at(x)])
-    before = line.before(flat)
-    on = (before < _PLANE) & (before > -thickness - _PLANE) & (points[:, 0] > front)
+    hinge = inner.meeting(x, sides)
+    before, along = line.before(flat), (flat - hinge) @ line.way
+    on = (before < _PLANE) & (before > -thickness - _PLANE) & (along > -_PLANE)
+    on &= (points[:, 0] > front) | (along > _GAP)
     if not on.any():
         return None
-    begins = float(np.percentile((flat[on] - hinge) @ line.way, 1))
+    begins, ends = np.percentile(along[on], [1, 99])
     upright = float(np.ptp(np.percentile(points[on, 3 - across], [1, 99])))
     inside = sides[0] - _EDGE < hinge[1] < sides[1] + _EDGE
-    if not inside or begins > _GAP or upright < _SMALLEST:
+    if not inside or begins > _GAP or min(upright, ends - begins) < _SMALLEST:
         return None
     return _Swung(on, across, line, hinge, thickness)
 
 
+def _beside_body(flat: Float[np.ndarray, "n 2"], front: float) -> Bool[np.ndarray, "n"]:
+    """Points to either side of the body, not behind its front: of a door that turned by about half a turn."""
+    body = flat[(flat[:, 0] < front - _NOT_BEHIND) & (flat[:, 0] > front - _BEHIND[1]), 1]
+    if len(body) < _LEAST:
+        return np.zeros(len(flat), bool)
+    low, high = np.percentile(body, [1, 99]) + [-_BESIDE_BODY, _BESIDE_BODY]
+    return ((flat[:, 1] < low) | (flat[:, 1] > high)) & (flat[:, 0] > front - _NOT_BEHIND)
+
+
 def _inwards(
-    line: _Line,
+    line: DoorLine,
     flat: Float[np.ndarray, "n 2"],
     front: float,
     sides: Float[np.ndarray, "2"],
@@ -217,7 +261,7 @@ def _inwards(
     Away from the side of the body where the hinge is; elsewhere towards where there is room, or else by the smaller turn.
     A flap shuts upwards, where there is room for it.
     """
-    hinge = line.across_at(front)
+    hinge = float(line.meeting(front, sides)[1])
     near = np.abs(sides - hinge)
     if across == 1 and near.min() < _EDGE:
         return 1.0 if near.argmin() == 0 else -1.0
@@ -228,30 +272,9 @@ def _inwards(
     return 1.0 if upwards else -1.0
 
 
-def _line(flat: Float[np.ndarray, "n 2"]) -> _Line | None:
-    """The line that most points are on; None where they are too few, or it does not lead out of the body."""
-    rng = np.random.default_rng(0)
-    first, second = flat[rng.integers(len(flat), size=(2, _TRIES))]
-    ways = second - first
-    lengths = np.linalg.norm(ways, axis=1)
-    long = lengths > _SMALLEST / 2
-    if not long.any():
-        return None
-    first, ways = first[long], ways[long] / lengths[long, None]
-    sides = np.column_stack([-ways[:, 1], ways[:, 0]])
-    some = flat[rng.integers(len(flat), size=min(len(flat), 2000))]
-    beside = np.abs(np.einsum("kni,ki->kn", some[None] - first[:, None], sides))
-    best = int((beside < _ONE_FACE).sum(axis=1).argmax())
-    on = flat[np.abs((flat - first[best]) @ sides[best]) < _PLANE]
-    middle = on.mean(axis=0)
-    way = np.linalg.svd(on - middle, full_matrices=False)[2][0]
-    leads_out = len(on) >= _LEAST and abs(way[0]) > 1e-3
-    return _Line(middle, way * np.sign(way[0])) if leads_out else None
-
-
 def _outer_face(
-    line: _Line, flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"], usual: float
-) -> tuple[_Line, float]:
+    line: DoorLine, flat: Float[np.ndarray, "n 2"], faces: Float[np.ndarray, "n 2"], usual: float
+) -> tuple[DoorLine, float]:
     """The line of the outer face, and how far behind it the inner one is [m]: `usual`, where one alone shows."""
     near = np.abs(line.before(flat)) < _THICKEST
     flat, faces = flat[near], faces[near]
@@ -296,6 +319,21 @@ def _foremost(facing: Float[np.ndarray, "n"], about: float) -> float:
         return about
     place = edges[many[-1]]
     return float(np.median(near[np.abs(near - place) < 2 * _BIN]))
+
+
+def _walled(
+    points: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    panel: Float[np.ndarray, "2 3"],
+) -> float:
+    """Share of a shut panel, without its rim, where a wall is, of points that are not the door's."""
+    low, high = panel + np.array([[-_WALL, _RIM, _RIM], [_WALL, -_RIM, -_RIM]])
+    counts = np.floor((high - low)[1:] / _CELL).astype(int)
+    if (counts < 1).any():
+        return 0.0
+    on = ((points > low) & (points < high)).all(axis=1) & (np.abs(normals[:, 0]) > _FACES)
+    cells = np.floor((points[on, 1:] - low[1:]) / _CELL).astype(int)
+    return len(np.unique(cells, axis=0)) / float(np.prod(counts))
 
 
 def _handle_guess(

@@ -46,6 +46,9 @@ _PRESS = 0.0015  # how far the fingers are sent into what they push [m]
 _INSET = 0.022  # of a push on a door's inside, from its free edge [m]
 _TURNS = ((True, 1.0), (False, 1.0), (True, -1.0), (False, -1.0))  # flat and sign of a push
 _RADII = (1.0, 0.6, 0.35)  # where between hinge and free edge
+_KNOB_LIKE = (
+    0.1  # of a unit axis across the way out of the front: what has less turns as a knob does
+)
 _BESIDE = 0.01  # how far what carries a handle sticks out beside it [m]
 # Where along the edge to push, as shares of half its length.
 _ALONG = (0.0, 0.5, -0.5, 0.8, -0.8)
@@ -187,12 +190,14 @@ def _slides(free: float, back: float, kind: GripKind) -> list[float]:
 
 
 def shutting_pushes(planner: MotionPlanner, part: PartEstimate) -> Iterator[Push]:
-    """On the front of the handle's bar; of a door also on its front."""
+    """On the front of the handle's bar; of a door also on its front. None of what turns as a knob does."""
     handle = part.handle
     normal = handle.rotation[:, 1]
     axis = handle.rotation[:, 0]
     if part.joint.kind == "hinge":
         axis = part.joint.axis - (part.joint.axis @ normal) * normal
+        if np.linalg.norm(axis) < _KNOB_LIKE:
+            return
         axis /= np.linalg.norm(axis)
     front = handle.origin + normal * handle.extents[1] / 2
     # Along the bar where that lies along the axis; a bar across it is met in its middle.

@@ -59,8 +59,14 @@ def test_a_wide_bar_makes_it_a_flap():
 def test_a_hinge_that_a_door_may_have_stays():
     upright = part(-Z)
     assert as_door(upright, "cabinet", -0.2) is upright
-    opened = part(X, "hinge", 0.7)
+    opened = part((Y - Z) / np.sqrt(2), "hinge", 0.7)
     assert as_door(opened, "cabinet", -0.2) is opened
+
+
+def test_what_would_turn_as_a_knob_is_no_open_door():
+    door = as_door(part(X, "hinge", 0.7), "cabinet", -0.2)
+    np.testing.assert_allclose(door.part.joint.axis, -Z)
+    assert door.opening == 0.0
 
 
 def test_what_words_call_a_drawer_slides_out_of_the_front():

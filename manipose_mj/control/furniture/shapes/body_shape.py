@@ -57,4 +57,4 @@ def body_slices(points: Float[np.ndarray, "n 3"], bounds: Float[np.ndarray, "2 3
             before[1, 2] = high
         else:
             slices.append(box)
-    return np.array(slices).reshape(-1, 2, 3)
+    return np.array(slices) if slices else bounds[None]
