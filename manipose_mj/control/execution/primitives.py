@@ -292,9 +292,8 @@ class Primitives:
         part = estimate.parts[name]
         aim = opening
         if self._executor.feels_joints:
-            shuts = opening <= part.joint.range[0]
-            kind = part.joint.kind
-            aim = opening - _BEYOND_SHUT[kind] if shuts else opening + _BEYOND_OPEN[kind]
+            beyond = _BEYOND_SHUT if opening <= part.joint.range[0] else _BEYOND_OPEN
+            aim += np.sign(opening - part.opening) * beyond[part.joint.kind]
         in_vain = self._in_vain.get(name, ())
         push = push_part(planner, estimate, part, aim, in_vain, in_stages=self.in_stages)
         yield from self._executor.follow(push.free_path)

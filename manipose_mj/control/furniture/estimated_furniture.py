@@ -14,7 +14,7 @@ from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
-from manipose_mj.control.furniture.opened_part import seen_open
+from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
 from manipose_mj.control.furniture.opening_search import Hidden, found_opening, misfit
 from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
 from manipose_mj.control.furniture.pulled_out import pulled_out
@@ -148,7 +148,9 @@ class EstimatedFurniture:
                 if part.opening > 0.0:
                     self._sure[name] = part.part.joint
                     if self._is_of(door, part, model.pose):
-                        model = model.with_part(as_large_as(part, door))
+                        past = seen_past(self._views.sights(self._physics), model.pose)
+                        large = reaching_unseen(model, as_large_as(part, door), cloud, past)
+                        model = model.with_part(with_extra(model, large, cloud))
         return model
 
     @property
@@ -172,6 +174,7 @@ class EstimatedFurniture:
         bodies: Mapping[str, int],
         geoms: Mapping[str, Bool[np.ndarray, "ngeom"]],
         objects: Mapping[str, ObjectEstimate],
+        carried: Mapping[str, tuple[int, ...]],
     ) -> dict[str, PartEstimate]:
         """What planners know of the parts.
 
@@ -179,6 +182,7 @@ class EstimatedFurniture:
           bodies: In the planning scene, by the parts' names.
           geoms: Likewise.
           objects: Some may lie in a drawer.
+          carried: Bodies of what else was seen on parts, likewise.
         """
         model = self.model
         if model is None:
@@ -194,7 +198,7 @@ class EstimatedFurniture:
                 cavity=part.part.cavity,
                 body=bodies[part.name],
                 geoms=geoms[part.name],
-                bodies_inside=_inside(model, part, objects),
+                bodies_inside=(*_inside(model, part, objects), *carried.get(part.name, ())),
                 cavity_seen=part.seen_inside,
                 goes_on=self._swings.goes_on(part.name),
             )

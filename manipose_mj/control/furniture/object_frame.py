@@ -15,7 +15,7 @@ _SAME_WAY = np.cos(0.1)  # cosine between the ways that two parts face, at least
 _UPRIGHT = 0.35  # cosine between normals of walls and the vertical, at most
 _CELL = 0.02  # in which points are thinned out [m]
 _TURNS = np.radians(np.arange(-45.0, 45.05, 0.1))  # that are tried
-_NEAR = np.radians(1.5)  # turns no larger than this change nothing
+_NEAR = np.radians(0.5)  # turns no larger than this change nothing
 _CLEARLY = 1.3  # how much squarer the walls have to be
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,6 +12,7 @@ from manipose_mj.assets.asset import Cavity
 from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.seen_through import Past, widened
+from manipose_mj.control.furniture.shapes.boxes import voxel_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import invert, transform
 
@@ -32,6 +34,12 @@ _WALL, _WALL_SHARE = (
     0.015,
     0.3,
 )  # of points of a rear wall from its plane [m]; of what faces the front
+# What is seen on a part: how far off its panel [m], how far off what is known [m]; cells [m] and points that make one count.
+_ON_PART, _KNOWN = np.array([0.12, 0.10, 0.10]), 0.015
+_EXTRA, _EXTRA_LEAST = 0.025, 4
+# How far beyond a panel's edges is looked whether it goes on, in steps [m]; points along an edge, and the share of them that a
+# camera looks past where it ends.
+_STEP_BEYOND, _STEPS_BEYOND, _SAMPLES, _SEEN_PAST = 0.02, 12, 8, 0.25
 _RIM_ROOF = 0.006  # kept off a roof that was measured [m]
 
 
@@ -56,6 +64,68 @@ def seen_open(
         back = invert(part.motion(part.opening))
         return _drawer(part, transform(back, points), normals)
     return _door(model, part, points, normals, past)
+
+
+def with_extra(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
+    """A part that stands open with boxes of all that is seen on it beyond its panel and handle.
+
+    Args:
+      model: The furniture.
+      part: One of it, at its present opening.
+      cloud: Of the furniture now.
+    """
+    points = transform(invert(model.pose), cloud.points)
+    shut = transform(invert(part.motion(part.opening)), points)
+    near = ((shut > part.panel[0] - _ON_PART) & (shut < part.panel[1] + _ON_PART)).all(axis=1)
+    body = [*model.solid] if len(model.solid) else []
+    for known, place in [*((box, points) for box in body), *((box, shut) for box in part.boxes)]:
+        near &= ~((place > known[0] - _KNOWN) & (place < known[1] + _KNOWN)).all(axis=1)
+    return replace(part, extra=voxel_boxes(shut[near], _EXTRA, _EXTRA_LEAST))
+
+
+def reaching_unseen(
+    model: FurnitureModel, part: PartModel, cloud: SceneCloud, past: Past
+) -> PartModel:
+    """A door that stands open, as large as the hole that it leaves where no camera sees it end.
+
+    Args:
+      model: The furniture.
+      part: The door, at its present opening.
+      cloud: Of the furniture now.
+      past: Which points, object frame [m], some camera looks past.
+    """
+    points = transform(invert(model.pose), cloud.points)
+    body = np.array([model.solid[:, 0].min(axis=0), model.solid[:, 1].max(axis=0)])
+    panel = part.panel.copy()
+    wall = points[(points[:, 0] > panel[0, 0] - _WALL) & (points[:, 0] < panel[1, 0] + _WALL), 1:]
+    for axis, end in product((1, 2), (0, 1)):
+        if (
+            np.abs(panel[end, axis] - part.part.joint.origin[axis]) < _AT_HINGE
+            and abs(float(part.part.joint.axis[axis])) < _FACING
+        ):
+            continue  # the hinge is there
+        for _ in range(_STEPS_BEYOND):
+            strip = panel.copy()
+            strip[1 - end, axis] = panel[end, axis]
+            strip[end, axis] += (1 if end else -1) * _STEP_BEYOND
+            grid = _spread(strip)
+            outside = abs(strip[end, axis] - body[:, axis].mean()) > np.ptp(body[:, axis]) / 2
+            if outside or past(transform(part.motion(part.opening), grid)).mean() > _SEEN_PAST:
+                break
+            on = ((wall > strip[0, 1:]) & (wall < strip[1, 1:])).all(axis=1)
+            cells = np.unique(np.floor(wall[on] / _STEP_BEYOND).astype(int), axis=0)
+            if len(cells) > _WALL_SHARE * np.prod(np.ptp(strip, axis=0)[1:]) / _STEP_BEYOND**2:
+                break
+            panel[end, axis] = strip[end, axis]
+    return replace(part, panel=panel)
+
+
+def _spread(box: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "n 3"]:
+    """Points all over the middle of a flat box."""
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    y, z = (low + shares * (high - low) for low, high in box[:, 1:].T)
+    flat = np.stack(np.meshgrid(y, z), axis=-1).reshape(-1, 2)
+    return np.column_stack([np.full(len(flat), box[:, 0].mean()), flat])
 
 
 def _drawer(

@@ -11,13 +11,18 @@ from manipose_mj.control.furniture.door_line import DoorLine, longest_line
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.shapes.body_shape import front_of
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose, invert, rotation_about, transform
 
+_FRONT_MISTAKEN = 0.05  # how far the front is from where the body is seen to end, at most [m]
 _LEAST_OUT = 0.06  # how far a door stands out of the body: handles stand out less [m]
 _ALONG = 0.4  # cosine between normals of a door and its hinge, at most
-_PLANE = 0.012  # how far points of a door are from its plane [m]
+_PLANE, _SLOPE = (
+    0.012,
+    0.02,
+)  # how far points of a door are from its plane [m], and more for each metre from its hinge
 _LEAST, _SMALLEST = 200, 0.08  # points of a door; its sides [m]
 _AJAR, _WIDEST = 0.5, 3.3  # openings at which a door stands out, or beside the body [rad]
 # Of a door that turned by about half a turn: how far beside the body, and how little behind the front, its points are [m].
@@ -25,6 +30,8 @@ _BESIDE_BODY, _NOT_BEHIND = 0.03, 0.05
 # Between the faces of a door [m]: where neither both show nor the rim that it shuts against, at least, at most.
 _THICKNESS, _THINNEST, _THICKEST = 0.018, 0.008, 0.05
 _ONE_FACE = 0.006  # how far points of a face are from it [m]
+# How far a face may be turned against its normals [rad], and how many more points are then on its line.
+_MISTURNED, _CLEARLY_MORE = 0.1, 1.5
 _FACES = 0.7  # cosine between their normals and the face's, at least
 _BEHIND = (0.03, 0.3)  # how far behind the front the sides of the body are looked for [m]
 # Of the front of the body: cosine of its normals and X, at least; how far it may be from where it is thought to be, bins in
@@ -38,7 +45,7 @@ _BESIDE, _BEHIND_PANEL = 0.03, 0.06  # how far beside and behind it estimates ha
 _FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
 # Of what a door shuts: in which points are counted, what is its rim, how far walls are from its place [m].
 _CELL, _RIM, _WALL = 0.02, 0.03, 0.015
-_NEAR_DOOR = np.array([0.1, 0.05, 0.05])  # of a door, with its handle [m]
+_NEAR_DOOR = np.array([0.1, 0.15, 0.15])  # of a door, with its handle [m]
 _MOST_WALLED, _MOST_STRAY = 0.5, 0.03
 _QUARTERS = (0.0, np.pi / 2, -np.pi / 2)  # by which the front may have been mistaken [rad]
 
@@ -99,12 +106,15 @@ def swung_out(model: FurnitureModel, cloud: SceneCloud) -> OpenDoor | None:
     """
     points = transform(invert(model.pose), cloud.points)
     normals = cloud.normals @ model.pose[:3, :3]
-    standing = points[:, 0] > model.front + _LEAST_OUT
+    front, seen = model.front, front_of(points)
+    if seen is not None and abs(seen - front) > _FRONT_MISTAKEN:
+        front = seen
+    standing = points[:, 0] > front + _LEAST_OUT
     # Doors turn about the vertical, flaps about the level; what turned by half a turn stands beside the body.
-    ways = [(1, standing), (2, standing), (1, _beside_body(points[:, :2], model.front))]
+    ways = [(1, standing), (2, standing), (1, _beside_body(points[:, :2], front))]
     doors: list[tuple[bool, int, OpenDoor]] = []
     for across, out in ways:
-        swung = _swung(points, normals, model.front, across, out)
+        swung = _swung(points, normals, front, across, out)
         if swung is not None:
             door = _opened(model.pose, points, normals, swung)
             doors.append((door.fits, int(swung.on.sum()), door))
@@ -154,16 +164,17 @@ def open_door_of(
     """
     first = None
     for quarter in _QUARTERS:
-        turned = sensed
+        turned, fitted = sensed, model
         if quarter:
             front = rotation_about(np.array([0.0, 0.0, 1.0]), quarter) @ sensed.front
             turned = replace(sensed, front=front)
-            model = fit_furniture(cloud, turned, model.category)
-        door = swung_out(model, cloud)
+            fitted = fit_furniture(cloud, turned, model.category)
+        door = swung_out(fitted, cloud)
         if door is not None and door.fits:
             return turned, door
         first = first or (None if door is None else (turned, door))
-    return first
+    # What was sensed to stand open may be right where no door that is seen fits.
+    return None if any(part.opening > 0.0 for part in model.parts) else first
 
 
 def with_open_door(sensed: SensedFurniture, door: OpenDoor) -> SensedFurniture:
@@ -228,8 +239,9 @@ def _swung(
     x = front - thickness if rim.sum() > _LEAST else front
     hinge = inner.meeting(x, sides)
     before, along = line.before(flat), (flat - hinge) @ line.way
-    on = (before < _PLANE) & (before > -thickness - _PLANE) & (along > -_PLANE)
-    on &= (points[:, 0] > front) | (along > _GAP)
+    off = _PLANE + _SLOPE * np.maximum(along, 0.0)
+    on = (before < off) & (before > -thickness - off) & (along > -_PLANE)
+    on &= (points[:, 0] > front) | (along > _BESIDE_BODY)
     if not on.any():
         return None
     begins, ends = np.percentile(along[on], [1, 99])
@@ -289,6 +301,7 @@ def _outer_face(
     normal = sign * np.median(faces[shown][on_face], axis=0)
     way = line.inwards * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
     line = replace(line, middle=flat[shown][on_face].mean(axis=0), way=way)
+    line = _along_points(line, flat[shown])
     if not outer_shows:
         return line.moved(usual), usual
     if not inner_shows:
@@ -296,6 +309,17 @@ def _outer_face(
     # A frame around a pane is as thick as the door.
     behind = float(-np.percentile(line.before(flat[inner]), 10))
     return line, float(np.clip(behind, _THINNEST, _THICKEST))
+
+
+def _along_points(line: DoorLine, face: Float[np.ndarray, "n 2"]) -> DoorLine:
+    """The line of a face as its points lie, if many more are on it than by their normals."""
+    found = longest_line(face)
+    if found is None or abs(float(found.way @ line.way)) < np.cos(_MISTURNED):
+        return line
+    way = found.way if found.way @ line.way > 0 else -found.way
+    found = replace(line, middle=found.middle, way=way)
+    counts = [int((np.abs(each.before(face)) < _ONE_FACE).sum()) for each in (line, found)]
+    return found if counts[1] > _CLEARLY_MORE * counts[0] else line
 
 
 def _rim_depth(facing: Float[np.ndarray, "n"], front: float) -> float:

@@ -59,6 +59,7 @@ class SensedWorld:
         self._surroundings: Boxes = no_boxes()
         self._model: CollisionModel | None = None
         self._arm: ArmModel | None = None
+        self._with_extra: tuple[str, ...] = ()  # parts on which more was seen than they are made of
 
     @property
     def arm(self) -> ArmModel:
@@ -90,14 +91,20 @@ class SensedWorld:
         _add_boxes(spec.worldbody, self._surroundings)
         model = self._furniture.model
         names: list[str] = []
+        self._with_extra = ()
         if model is not None:
             pose = pose_to_vector(model.pose)
+            self._with_extra = tuple(part.name for part in model.parts if len(part.extra))
             base = spec.worldbody.add_body(name=_BASE, pos=pose[:3], quat=pose[3:])
             _add_boxes(base, model.fixed)
             for part in model.parts:
                 names.append(PREFIX + part.name)
                 body = spec.worldbody.add_body(name=names[-1], pos=pose[:3], quat=pose[3:])
                 _add_boxes(body, part.boxes)
+                if len(part.extra):
+                    names.append(_extra_of(PREFIX + part.name))
+                    extra = spec.worldbody.add_body(name=names[-1], pos=pose[:3], quat=pose[3:])
+                    _add_boxes(extra, part.extra)
         self._arm = ArmModel.of_spec(spec.copy(), _ROBOT)
         for name in names:
             body = spec.body(name)
@@ -121,8 +128,9 @@ class SensedWorld:
         built = self._built
         model = built.model
         qpos = model.qpos0.copy()
-        placed = {**poses, **self._furniture.part_poses()}
-        for name, pose in placed.items():
+        parts = self._furniture.part_poses()
+        extra = {_extra_of(name): parts[name] for name in self._with_extra}
+        for name, pose in {**poses, **parts, **extra}.items():
             address = built.joint_address(self.body(name))
             qpos[address : address + 7] = pose_to_vector(pose)
         qpos[built.arm_addresses] = joints
@@ -136,7 +144,8 @@ class SensedWorld:
         """All that were found."""
         bodies = {name: self.body(name) for name in self._furniture.part_poses()}
         geoms = {name: subtree_geoms(scene.model, body) for name, body in bodies.items()}
-        return self._furniture.parts(bodies, geoms, objects)
+        carried = {name: (self.body(_extra_of(name)),) for name in self._with_extra}
+        return self._furniture.parts(bodies, geoms, objects, carried)
 
     def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """By the hand where it holds a part, by cameras else."""
@@ -162,6 +171,11 @@ class SensedWorld:
     def _built(self) -> CollisionModel:
         assert self._model is not None  # reset comes first
         return self._model
+
+
+def _extra_of(name: str) -> str:
+    """The body that stands for what else was seen on a part, by the name of the part or of its body."""
+    return f"{name}-extra"
 
 
 def _robot_alone() -> mujoco.MjSpec:

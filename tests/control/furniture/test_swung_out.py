@@ -83,7 +83,9 @@ def test_a_front_that_was_taken_for_a_side_is_where_the_door_leaves_a_hole(off):
     front, *sides = body()
     shut = front[0][:, 1] > 0.02  # the door has left the other half
     half = (front[0][shut], front[1][shut])
-    seen = cloud([half, *sides, *door(-HALF, 1.3, "outer inner")])
+    corner, depth, width = np.array([-FRONT, -HALF, 0.0]), 2 * FRONT * X, 2 * HALF * Y
+    inside = [rectangle(corner, width, HEIGHT * Z, X), rectangle(corner, depth, width, Z)]
+    seen = cloud([half, *sides, *inside, *door(-HALF, 1.3, "outer inner")])
     door_itself = swung_out(MODEL, seen)
     assert door_itself is not None
     parts = (replace(door_itself.sensed, confidence=0.3),)

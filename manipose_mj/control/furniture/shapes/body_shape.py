@@ -11,6 +11,9 @@ _SLICE = 0.05  # height of what the body is cut into [m]
 _ALIKE = 0.02  # slices whose sides differ by less are one [m]
 _SLICE_LEAST = 25  # points
 _CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
+# In which the front is looked for [m], how many along X there are at least; which share of its width and height a body has at
+# its front, of those that are exceeded in so many percent of the places.
+_THICK_CELL, _FEWEST_CELLS, _WHOLE, _MOST_OF = 0.02, 6, 0.6, 75
 
 
 def ends_of(
@@ -24,6 +27,23 @@ def ends_of(
     middles = (cells[counts >= min(_CELL_LEAST, counts.max())] + 0.5) * _CELL
     low, high = np.percentile(middles, [0.4, 99.6], axis=0)
     return low, high
+
+
+def front_of(points: Float[np.ndarray, "n 3"]) -> float | None:
+    """Where along X a body ends that is as wide and as high there as elsewhere [m]; None where too little of it shows.
+
+    A door or a flap that stands open before it is thin one way.
+    """
+    cells, counts = np.unique(
+        np.floor(points / _THICK_CELL).astype(int), axis=0, return_counts=True
+    )
+    cells = cells[counts >= _CELL_LEAST]
+    places = np.unique(cells[:, 0])
+    if len(places) < _FEWEST_CELLS:
+        return None
+    extents = np.array([np.ptp(cells[cells[:, 0] == x, 1:], axis=0) for x in places])
+    whole = (extents > _WHOLE * np.percentile(extents, _MOST_OF, axis=0)).all(axis=1)
+    return float((places[whole].max() + 1) * _THICK_CELL) if whole.any() else None
 
 
 def body_slices(points: Float[np.ndarray, "n 3"], bounds: Float[np.ndarray, "2 3"]) -> Boxes:

@@ -6,13 +6,13 @@ The object frame is upright: X out of the front, Z up. All boxes are of that fra
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
-from manipose_mj.control.furniture.shapes.boxes import Boxes, without
+from manipose_mj.control.furniture.shapes.boxes import Boxes, no_boxes, without
 from manipose_mj.poses import compose, rotation_about
 
 _TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]
@@ -35,6 +35,7 @@ class PartModel:
       confidence: Of its estimate.
       looks: `(n, 3)`, points that were seen on it, as if it were shut [m].
       seen_inside: Whether the cavity was measured; else it is a guess.
+      extra: Boxes of what else was seen on it: the hand has to keep clear of it.
     """
 
     part: MovingPart
@@ -44,6 +45,7 @@ class PartModel:
     confidence: float
     looks: Float[np.ndarray, "n 3"]
     seen_inside: bool = False
+    extra: Boxes = field(default_factory=no_boxes)
 
     @property
     def name(self) -> str:
