@@ -187,11 +187,17 @@ class Baseline:
             acted = falls_short = False
             try:
                 steps = _until_a_look(plan) if looks > 0 else plan
-                for action in self._carry_out(
-                    steps, planner, primitives, progress, thorough=not step_by_step
-                ):
-                    acted = True
-                    yield action
+                for number, piece in enumerate(_led_and_pushed(steps) if looks > 0 else (steps,)):
+                    if number and not scene.perception.unseen:
+                        # What the hand led is measured before it is pushed on.
+                        scene.perception.look_again()
+                        seen, arm = executor.observe(), scene.perception.arm
+                        planner = MotionPlanner(seen.scene, arm, timestep, rng, allowance)
+                    for action in self._carry_out(
+                        piece, planner, primitives, progress, thorough=not step_by_step
+                    ):
+                        acted = True
+                        yield action
                 hidden = parts_to_look_behind(task.goals, estimate)
                 if len(steps) < len(plan) or (looks > 0 and hidden):
                     looks -= 1
@@ -314,6 +320,15 @@ def _until_a_look(plan: Plan) -> Plan:
         return plan
     count = next((i for i, step in enumerate(plan) if step.subject != first), len(plan))
     return plan[:count]
+
+
+def _led_and_pushed(steps: Plan) -> tuple[Plan, ...]:
+    """Steps that lead a part by its handle, and those that push it on afterwards."""
+    for i in range(1, len(steps)):
+        one, two = steps[i - 1], steps[i]
+        if one.primitive == "release" and two.opening is not None and one.subject == two.subject:
+            return steps[:i], steps[i:]
+    return (steps,)
 
 
 def _share_open(part: PartEstimate) -> float:

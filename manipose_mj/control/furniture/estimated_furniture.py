@@ -120,7 +120,10 @@ class EstimatedFurniture:
                     break
             else:
                 found.reverse()
-            self.model = self._with_open_parts(*found[-1], cloud, asked)
+            model = self._with_open_parts(*found[-1], cloud, asked)
+            for part in model.parts:
+                model = model.with_part(with_extra(model, part, cloud))
+            self.model = model
 
     def _looks_shut(self, model: FurnitureModel) -> list[str]:
         """Of the parts that should stand open, those that do not."""
@@ -150,7 +153,7 @@ class EstimatedFurniture:
                     if self._is_of(door, part, model.pose):
                         past = seen_past(self._views.sights(self._physics), model.pose)
                         large = reaching_unseen(model, as_large_as(part, door), cloud, past)
-                        model = model.with_part(with_extra(model, large, cloud))
+                        model = model.with_part(large)
         return model
 
     @property
@@ -310,6 +313,11 @@ class EstimatedFurniture:
                         self._sure[part.name] = panel.part.joint
                 # What does not show stays as it is usual: nobody need look again.
                 opened = replace(seen_open(model, found, cloud, past), seen_inside=True)
+                if part.hinged:
+                    if door is not None and self._is_of(door, part, model.pose):
+                        opened = as_large_as(opened, door)
+                    opened = reaching_unseen(model, opened, cloud, past)
+                    opened = with_extra(model, opened, cloud)
                 model = model.with_part(opened).without_fronts_over(opened, asked)
         self.model = model
 

@@ -34,9 +34,11 @@ _WALL, _WALL_SHARE = (
     0.015,
     0.3,
 )  # of points of a rear wall from its plane [m]; of what faces the front
-# What is seen on a part: how far off its panel [m], how far off what is known [m]; cells [m] and points that make one count.
-_ON_PART, _KNOWN = np.array([0.12, 0.10, 0.10]), 0.015
-_EXTRA, _EXTRA_LEAST = 0.025, 4
+# What is seen on a part that stands open, or is shut: how far off its panel; how far off what is known, and off handles, whose
+# shape is not; cells [m], and points that make one count.
+_ON_OPEN, _ON_SHUT = np.array([0.12, 0.10, 0.10]), np.array([0.08, 0.0, 0.0])
+_KNOWN, _HANDLED = 0.008, 0.03
+_EXTRA, _EXTRA_LEAST = 0.025, 6
 # How far beyond a panel's edges is looked whether it goes on, in steps [m]; points along an edge, and the share of them that a
 # camera looks past where it ends.
 _STEP_BEYOND, _STEPS_BEYOND, _SAMPLES, _SEEN_PAST = 0.02, 12, 8, 0.25
@@ -67,7 +69,7 @@ def seen_open(
 
 
 def with_extra(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> PartModel:
-    """A part that stands open with boxes of all that is seen on it beyond its panel and handle.
+    """A part with boxes of all that is seen on it beyond its panel and handle: what stands out of a front, or an open door's end.
 
     Args:
       model: The furniture.
@@ -76,10 +78,18 @@ def with_extra(model: FurnitureModel, part: PartModel, cloud: SceneCloud) -> Par
     """
     points = transform(invert(model.pose), cloud.points)
     shut = transform(invert(part.motion(part.opening)), points)
-    near = ((shut > part.panel[0] - _ON_PART) & (shut < part.panel[1] + _ON_PART)).all(axis=1)
-    body = [*model.solid] if len(model.solid) else []
-    for known, place in [*((box, points) for box in body), *((box, shut) for box in part.boxes)]:
-        near &= ~((place > known[0] - _KNOWN) & (place < known[1] + _KNOWN)).all(axis=1)
+    # Beside what is shut, something else begins.
+    around = _ON_OPEN if part.opening > 0.0 else _ON_SHUT
+    near = ((shut > part.panel[0] - around) & (shut < part.panel[1] + around)).all(axis=1)
+    known = [(box, points, _KNOWN) for box in model.solid]
+    for other in model.parts:
+        own = other.name == part.name
+        place = shut if own else transform(invert(other.motion(other.opening)), points)
+        known.append(((part if own else other).panel, place, _KNOWN))
+        for box in (part if own else other).handle:
+            known.append((box, place, _HANDLED))
+    for box, place, margin in known:
+        near &= ~((place > box[0] - margin) & (place < box[1] + margin)).all(axis=1)
     return replace(part, extra=voxel_boxes(shut[near], _EXTRA, _EXTRA_LEAST))
 
 

@@ -42,6 +42,10 @@ _GAP = 0.08  # how far from its hinge a door begins to show, at most [m]
 _HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
 _HANDLE_LEAST = 30  # such points
 _BESIDE, _BEHIND_PANEL = 0.03, 0.06  # how far beside and behind it estimates have handles [m]
+_QUITE_SURE, _ELSEWHERE = (
+    0.4,
+    0.2,
+)  # confidence of an estimate, and how far from a door it is elsewhere [m]
 _FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
 # Of what a door shuts: in which points are counted, what is its rim, how far walls are from its place [m].
 _CELL, _RIM, _WALL = 0.02, 0.03, 0.015

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manipose_mj.control.baseline import _until_a_look
+from manipose_mj.control.baseline import _led_and_pushed, _until_a_look
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
 from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.tasks.goals import ShutGoal, TakenOutGoal
@@ -38,6 +39,14 @@ def test_with_true_furniture_all_is_planned_at_once(scene):
     # Where somebody looks again, only what opens the drawer is carried out before that.
     assert primitives(_until_a_look(plan)) == primitives(plan[:3])
     assert {step.subject for step in _until_a_look(plan)} == {DRAWER}
+
+
+def test_a_door_is_measured_between_being_led_and_being_pushed():
+    led = (Step("grasp_at", "door"), Step("move_to", "door", opening=1.5), Step("release", "door"))
+    push = Step("move_to", "door", opening=1.5)
+    assert _led_and_pushed((*led, push)) == (led, (push,))
+    assert _led_and_pushed(led) == (led,)
+    assert _led_and_pushed((push, push)) == ((push, push),)
 
 
 def test_a_cavity_that_nobody_measured_is_opened_first(scene):

@@ -18,6 +18,7 @@ _SOLID = np.array([1.0, 0.8, 0.7])
 _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
 _FACES = 0.9  # cosine between a handle's Y and the way out of the front, at least
+_THIN_BAR, _USUAL_DEPTH = 0.010, 0.012  # how deep bars are at least, and are kept clear of [m]
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -64,10 +65,13 @@ def _measured(
     middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
     middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
     if length > 0.045:
-        middle = middle + handle[:3, 1] * (front_side - 0.005)
+        # A bar's rear does not show: it is taken to be as deep as it is wide, if there is room for that.
+        depth = float(np.clip(across, _THIN_BAR, max((front_side - panel) / 2, _THIN_BAR)))
+        middle = middle + handle[:3, 1] * (front_side - depth / 2)
+        depth = max(depth, _USUAL_DEPTH)
     else:
+        depth = max(front_side - panel, 0.015)
         middle = middle + handle[:3, 1] * (front_side + panel) / 2
-    depth = 0.012 if length > 0.045 else max(front_side - panel, 0.015)
     extents = np.array([length, depth, float(np.clip(across, 0.010, 0.030))])
     rotation = handle[:3, :3]
     if length <= 0.045:
