@@ -44,6 +44,7 @@ _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
 _UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
+_MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
 _MEET = 0.01  # handles nearer than this are one [m]
 _LOOKS = 500
 
@@ -59,8 +60,10 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     pose = object_pose(cloud, sensed)
     points = transform(invert(pose), cloud.points)
     normals = cloud.normals @ pose[:3, :3]
-    shut = [_as_if_shut(part, pose) for part in sensed.parts]
+    shut = [_Shut(part, pose) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
+    for part in shut:
+        part.meet_handle(points, normals)
     if category not in WITH_KNOBS:
         for part in shut:
             part.turn_as_doors_do(shut, bounds, points, normals)
@@ -131,6 +134,16 @@ class _Shut:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
 
+    def meet_handle(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    ) -> None:
+        """Move a shut part's handle to what stands out of its front there: where it is tells which part is beside which."""
+        front = _panel_place(points, normals, self) if self.opening == 0.0 else None
+        if front is not None:
+            label, seen = handle_label(points, self.handle, front)
+            if seen and np.linalg.norm(label.origin - self.handle[:3, 3]) < _MISPLACED:
+                self.handle[:3, 3] = label.origin
+
     def turn_as_doors_do(
         self,
         others: Sequence[_Shut],
@@ -189,10 +202,6 @@ class _Shut:
         self.handle = self.back @ stands
         # The handle was taken to be as far open as the panel.
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3], np.cos(_MISSWUNG))
-
-
-def _as_if_shut(part: SensedPart, pose: Float[np.ndarray, "4 4"]) -> _Shut:
-    return _Shut(part, pose)
 
 
 def _motion(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:

@@ -76,3 +76,18 @@ def test_how_a_knob_is_turned_says_nothing():
     assert seen
     assert label.extents[0] < 0.045
     np.testing.assert_allclose(label.rotation, ACROSS_FRONT)
+
+
+def test_doors_side_by_side_are_told_apart_by_where_their_knobs_are():
+    knobs = [
+        rectangle(np.array([FRONT + 0.03, y - 0.01, 0.29]), 0.02 * Y, 0.02 * Z, X)
+        for y in (-0.05, 0.05)
+    ]
+    # The estimates have one knob above the other, rather than beside it.
+    parts = tuple(
+        sensed("hinge", [FRONT + 0.03, y, z], origin=np.array([FRONT, 2 * HALF, 0.0]), axis=Z)
+        for y, z in ((-0.045, 0.34), (0.045, 0.25))
+    )
+    model = fit_furniture(cloud([*body(), *knobs]), SensedFurniture(X, parts), "cabinet")
+    hinges = sorted(float(part.part.joint.origin[1]) for part in model.parts)
+    np.testing.assert_allclose(hinges, [-HALF, HALF], atol=0.03)
