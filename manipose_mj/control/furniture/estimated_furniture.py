@@ -121,7 +121,7 @@ class EstimatedFurniture:
             else:
                 found.reverse()
             model = self._with_open_parts(*found[-1], cloud, asked)
-            for part in model.parts:
+            for part in model.parts if self._parts_alone else ():
                 model = model.with_part(with_extra(model, part, cloud))
             self.model = model
 
@@ -317,9 +317,14 @@ class EstimatedFurniture:
                     if door is not None and self._is_of(door, part, model.pose):
                         opened = as_large_as(opened, door)
                     opened = reaching_unseen(model, opened, cloud, past)
-                    opened = with_extra(model, opened, cloud)
+                    opened = with_extra(model, opened, cloud) if self._parts_alone else opened
                 model = model.with_part(opened).without_fronts_over(opened, asked)
         self.model = model
+
+    @property
+    def _parts_alone(self) -> bool:
+        """Whether nothing is put in or taken out: hands that do come too near to doors to heed every point on them."""
+        return all(isinstance(goal, OpenGoal | ShutGoal) for goal in self._task.goals)
 
     def _shall_open_wide(self, part: PartModel) -> bool:
         """Whether it is a door that shall be open as far as it goes."""
