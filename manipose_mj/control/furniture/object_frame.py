@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
-from manipose_mj.control.furniture.walls import squareness, walls_of
+from manipose_mj.control.furniture.shapes.walls import squareness, walls_of
 from manipose_mj.poses import compose
 
 AJAR = {"slide": 0.015, "hinge": 0.06}  # estimated openings below are none [m, rad]

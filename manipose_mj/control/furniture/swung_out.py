@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.control.furniture.door_line import DoorLine, longest_line
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import front_of
+from manipose_mj.control.furniture.shapes.door_line import DoorLine, longest_line
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose, invert, rotation_about, transform
@@ -42,10 +42,6 @@ _GAP = 0.08  # how far from its hinge a door begins to show, at most [m]
 _HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
 _HANDLE_LEAST = 30  # such points
 _BESIDE, _BEHIND_PANEL = 0.03, 0.06  # how far beside and behind it estimates have handles [m]
-_QUITE_SURE, _ELSEWHERE = (
-    0.4,
-    0.2,
-)  # confidence of an estimate, and how far from a door it is elsewhere [m]
 _FREE = 0.85  # where handles are, as a share of the way from the hinge to the free edge
 # Of what a door shuts: in which points are counted, what is its rim, how far walls are from its place [m].
 _CELL, _RIM, _WALL = 0.02, 0.03, 0.015

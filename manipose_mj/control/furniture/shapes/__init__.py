@@ -1,1 +1,1 @@
-"""What furniture is made into: boxes of its body, and parts with panels and handles that move."""
+"""What clouds of furniture are made into: walls, lines of open doors, boxes of the body, parts with panels and handles that move."""

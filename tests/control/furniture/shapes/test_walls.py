@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.walls import squareness, walls_of
+from manipose_mj.control.furniture.shapes.walls import squareness, walls_of
 from tests.control.furniture.synthetic import HALF, body, cloud, door
 
 ANGLES = np.radians(np.arange(-45.0, 45.0, 0.1))
