@@ -19,6 +19,9 @@ _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
 _FACES = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _THIN_BAR, _USUAL_DEPTH = 0.010, 0.012  # how deep bars are at least, and are kept clear of [m]
+# Across and along a bar: of cells whose number tells how much of its length shows there [m]; the share of the most, under
+# which it counts as noise.
+_CELL, _RARE = np.array([0.002, 0.006]), 0.3
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -56,11 +59,9 @@ def _measured(
         return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
     along = run_around(local[on, 0], 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
-    # Neighbouring surfaces bleed into outlines: what is rare counts as noise.
-    across = float(np.ptp(np.percentile(local[on, 2], [8, 92])))
     length = max(along[1] - along[0], 0.012)
-    # Of the bar, its front shows, and a side.
-    sides = np.percentile(local[on, 2], [8, 92])
+    sides = _sides(local[on])
+    across = float(np.ptp(sides))
     front_side = float(np.percentile(local[on, 1], 85))
     middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
     middle = middle + handle[:3, 0] * (along[0] + along[1]) / 2
@@ -80,6 +81,20 @@ def _measured(
         extents = np.array([side, depth, side])
         rotation = ACROSS_FRONT if handle[0, 1] > _FACES else rotation
     return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
+
+
+def _sides(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "2"]:
+    """Where a bar ends across, from its points in its own frame [m].
+
+    Of the bar, its front shows, and often a side, with more points than the front: what counts is where there are points
+    over much of its length, not how many. Neighbouring surfaces bleed into outlines: what is rare counts as noise.
+    """
+    cells = np.unique(np.floor(points[:, [2, 0]] / _CELL).astype(int), axis=0)
+    places, lengths = np.unique(cells[:, 0], return_counts=True)
+    often = places[lengths > _RARE * lengths.max()]
+    ends = _CELL[0] * np.array([often.min(), often.max() + 1])
+    near = (points[:, 2] >= ends[0]) & (points[:, 2] <= ends[1])
+    return np.stack([points[near, 2].min(), points[near, 2].max()])
 
 
 def run_around(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
