@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.control.grasping.handle_grasps import Grip, GripKind, grip_now, grips
 from manipose_mj.control.grasping.part_motion import APPROACH, PartWay, find_way
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS
@@ -26,6 +27,10 @@ _STAGE = {"hinge": 0.2, "slide": 0.04}
 _STEP_BACK = 6  # poses of a way
 _ALONG_HINGE = 0.9  # cosine between what the hand tilts about and a door's hinge, at least
 _MAX_TRIES = 12  # ways for which an approach is looked for
+# How much wider than usual the gripper is open as it comes to a handle that may be beside its estimate, the first that there
+# is room for [m].
+_WIDER = (0.030, 0.020, 0.010)
+_EVERY = 4  # poses of a path, of which one is looked at
 # How a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
 _KINDS: tuple[GripKind, ...] = ("usual", "fingertips")
 _FIRM_KINDS: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
@@ -91,11 +96,11 @@ def grip_handle(
         )
         ways += found
         far = [way for way in found if anywhere or leads_enough(way, part, opening)]
-        grip = _approached(planner, estimate, part, far)
+        grip = _approached(planner, estimate, part, far, wider=following)
         if grip is not None:
             return grip
     stages = [way for way in ways if is_a_stage(way, part)]
-    grip = _approached(planner, estimate, part, stages)
+    grip = _approached(planner, estimate, part, stages, wider=following)
     if grip is not None:
         return grip
     raise StageFailure(
@@ -111,9 +116,14 @@ def _closes_on(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool
 
 
 def _approached(
-    planner: MotionPlanner, estimate: SceneEstimate, part: PartEstimate, ways: list[PartWay]
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    part: PartEstimate,
+    ways: list[PartWay],
+    *,
+    wider: bool,
 ) -> HandleGrip | None:
-    """The first of the ways that the hand can come to."""
+    """The first of the ways that the hand can come to; `wider`: with its fingers open as wide as there is room for."""
     # At low handles the wrist is within millimetres of the table: only if nothing else will do.
     for tight in (False, True):
         for way in ways[:_MAX_TRIES]:
@@ -125,8 +135,29 @@ def _approached(
                 estimate.joints, approach[0], CollisionQuery(opening=wide), tight=tight
             )
             if free_path is not None:
+                if wider:
+                    wide = _widest(planner, part, free_path, approach, wide)
                 return HandleGrip(free_path, approach, wide, way.hold.opening)
     return None
+
+
+def _widest(
+    planner: MotionPlanner,
+    part: PartEstimate,
+    free_path: Float[np.ndarray, "t 7"],
+    approach: Float[np.ndarray, "s 7"],
+    opening: float,
+) -> float:
+    """How wide the gripper may be open on its way to a handle, at least so wide [m]."""
+    for more in _WIDER:
+        wide = min(opening + more, MAX_OPENING)
+        free = CollisionQuery(opening=wide)
+        near = CollisionQuery(APPROACH, opening=wide, target=part.geoms)
+        if not any(planner.collides(joints, free) for joints in free_path[::_EVERY]) and not any(
+            planner.collides(joints, near) for joints in approach[::_EVERY]
+        ):
+            return wide
+    return opening
 
 
 def way_in_hand(
