@@ -9,6 +9,9 @@ from manipose_mj.control.furniture.shapes.handle_shape import run_around
 
 # Of what has knobs that turn about the way out of the front; parts of other categories are doors if they turn.
 WITH_KNOBS = frozenset({"dishwasher", "microwave", "oven", "washing_machine"})
+# How far doors open in the median of the training furniture [rad]: upright hinges by category, those of flaps, of others.
+_TYPICAL_SWING = {"microwave": 1.83, "oven": 1.57, "cabinet": 1.92}
+_LEVEL_SWING, _ANY_SWING = 1.57, 1.75
 _STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at least
 # Of the handle of a flap: how far from the middle at most, across, and at least, upright, of the panel's half.
 _ACROSS, _UPRIGHT = 0.3, 0.5
@@ -23,6 +26,16 @@ _FACE, _STRIP, _GAP, _TELLING = 0.04, 0.10, 0.15, 60
 def is_straight(axis: Float[np.ndarray, "3"]) -> bool:
     """Whether an axis, object frame, is upright or level along the front."""
     return float(np.abs(axis[1:]).max()) > _STRAIGHT
+
+
+def is_level(axis: Float[np.ndarray, "3"]) -> bool:
+    """Whether a flap turns about such an axis, object frame."""
+    return abs(float(axis[2])) < 0.7
+
+
+def usual_swing(axis: Float[np.ndarray, "3"], category: str) -> float:
+    """How far doors open that turn about such an axis, object frame [rad]."""
+    return _LEVEL_SWING if is_level(axis) else _TYPICAL_SWING.get(category, _ANY_SWING)
 
 
 def can_be_a_door(

@@ -11,6 +11,7 @@ from dm_control import mjcf
 from jaxtyping import Bool, Float
 
 from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.door_hinge import is_level, usual_swing
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
@@ -44,7 +45,9 @@ from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _LEAST_POINTS = 1500  # of furniture that is looked at
 _LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
-_BEYOND = 0.05  # the usual range of a door, from which on nobody knows how far it opens [rad]
+# Of the usual range of a door, from which on nobody knows how far it opens: where no stop was felt, its share; where one
+# was, how far beyond [rad].
+_NEAR_END, _BEYOND = 0.9, 0.05
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 
@@ -270,10 +273,17 @@ class EstimatedFurniture:
         if stopped:
             self._before[name] = started  # a hand that slips goes on without the part
         low, high = part.part.joint.range
+        if is_level(joint.axis) != is_level(part.part.joint.axis):
+            # What was taken for a flap goes as a door does, or the other way round.
+            high = usual_swing(joint.axis, model.category)
         ends = stopped and self._stops.is_end(name, joint.kind, opening, high)
         end = opening if ends else max(high, opening)
-        if not stopped and opening > high + _BEYOND and self._shall_open_wide(part):
-            end = self._swings.led(name, opening, high)
+        if self._shall_open_wide(part):
+            usual = usual_swing(joint.axis, model.category)
+            # A hand that stops beyond what is usual may have come to its own end. Flaps end where they are level.
+            sure_end = stopped or is_level(joint.axis)
+            if opening > (usual + _BEYOND if sure_end else _NEAR_END * usual):
+                end = self._swings.led(name, opening, usual)
         joint = replace(joint, range=(low, end))
         moved = replace(part, part=replace(part.part, joint=joint), opening=opening)
         # Where the hand would be were the part shut, by the joint as it is known now.
@@ -282,9 +292,12 @@ class EstimatedFurniture:
         self.model = model.with_part(moved)
 
     def pushed(self, name: str, opening: float) -> None:
-        """The hand pushed a part to about this opening [m or rad]."""
+        """The hand pushed a part to about this opening [m or rad]; no further than it was: it is as open as anybody can tell."""
         part = self._part(name)
-        if part is not None and self.model is not None:
+        if part is not None and self.model is not None and opening == part.opening:
+            self._swings.ends(name)
+            self.model = self.model.with_part(part.opening_to(opening))
+        elif part is not None and self.model is not None:
             self._before[name] = part.opening
             self._swings.pushed(name, opening)
             self.model = self.model.with_part(part.at(max(opening, 0.0)))

@@ -73,6 +73,10 @@ class Swings:
         self._beyond.remove(name)
         return opening
 
+    def ends(self, name: str) -> None:
+        """Nothing leads a door any further."""
+        self._beyond.discard(name)
+
     def goes_on(self, name: str) -> bool:
         """Whether a door was led as far as is usual, or further, and did not stop."""
         return name in self._beyond

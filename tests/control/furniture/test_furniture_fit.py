@@ -93,3 +93,39 @@ def test_doors_side_by_side_are_told_apart_by_where_their_knobs_are():
     for part in model.parts:
         own = -HALF if part.handle[:, :, 1].mean() < 0 else HALF
         assert part.part.joint.origin[1] == pytest.approx(own, abs=0.03)
+
+
+def knob(y: float) -> tuple[np.ndarray, np.ndarray]:
+    """Before the front, seen from ahead."""
+    return rectangle(np.array([FRONT + 0.03, y - 0.012, 0.29]), 0.024 * Y, 0.024 * Z, X)
+
+
+def test_the_other_knob_of_double_doors_is_found_though_it_was_not_sensed():
+    part = sensed("hinge", [FRONT + 0.03, -0.035, 0.30])
+    model = fit_furniture(
+        cloud([*body(), knob(-0.035), knob(0.035)]), SensedFurniture(X, (part,)), "cabinet"
+    )
+    hinges = sorted(found.part.joint.origin[1] for found in model.parts)
+    assert hinges == pytest.approx([-HALF, HALF], abs=0.03)
+    for found in model.parts:
+        np.testing.assert_allclose(np.abs(found.part.joint.axis), Z, atol=1e-6)
+
+
+def test_a_handle_alone_has_no_twin_and_neither_has_a_drawer():
+    alone = sensed("hinge", [FRONT + 0.03, -0.035, 0.30])
+    one = fit_furniture(cloud([*body(), knob(-0.035)]), SensedFurniture(X, (alone,)), "cabinet")
+    assert len(one.parts) == 1
+    drawer = sensed("slide", [FRONT + 0.03, -0.035, 0.30])
+    pair = cloud([*body(), knob(-0.035), knob(0.035)])
+    assert len(fit_furniture(pair, SensedFurniture(X, (drawer,)), "cabinet").parts) == 1
+
+
+def test_a_bar_that_shows_more_of_its_side_than_of_its_front_is_as_wide_as_its_front():
+    bar = np.array([FRONT + 0.05, -0.007, 0.1])
+    front, _ = rectangle(bar, 0.014 * Y, 0.15 * Z, X)
+    side = [rectangle(bar + [-0.04, 0.014, 0.0], 0.04 * X, 0.15 * Z, Y)[0] for _ in range(4)]
+    askew = compose(UP_FRONT, np.array([FRONT + 0.04, -0.006, 0.17]))
+    label, seen = handle_label(np.concatenate([front, *side]), askew, FRONT)
+    assert seen
+    assert label.origin[1] == pytest.approx(0.0, abs=0.003)
+    assert label.extents[2] == pytest.approx(0.014, abs=0.004)

@@ -50,3 +50,11 @@ def test_a_door_that_stops_where_it_usually_does_opens_no_further():
     swings.pushed("door", 1.91)
     assert swings.end("door", 1.75, 1.92) == 1.92
     assert not swings.goes_on("door")
+
+
+def test_a_door_that_nothing_leads_any_further_is_as_open_as_it_goes():
+    swings = Swings()
+    swings.led("door", 1.9, 1.92)
+    assert swings.goes_on("door")
+    swings.ends("door")
+    assert not swings.goes_on("door")

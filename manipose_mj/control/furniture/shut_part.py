@@ -1,0 +1,212 @@
+"""A part of furniture as it was sensed, taken back to where it is shut and corrected by what shows there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from manipose_mj.assets.asset import MovingPart
+from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
+from manipose_mj.control.furniture.object_frame import AJAR
+from manipose_mj.control.furniture.part_sensing import SensedPart
+from manipose_mj.control.furniture.shapes.furniture_model import PartModel
+from manipose_mj.control.furniture.shapes.handle_shape import handle_label
+from manipose_mj.control.furniture.shapes.twin_handle import twin_of
+from manipose_mj.poses import compose, invert, transform
+
+FACING = 0.6  # cosine between normals of the front and X, at least
+_SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
+_TELLING = 150  # points of a panel that tell how far it swung, at least
+_MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
+# How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
+_BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
+# Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
+_USUAL_HALF, _BESIDE = 0.05, 0.005
+_KNOBS = 0.5  # cosine between the axis of a knob and X, at least
+_MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
+# Of the other one of double doors: how near a handle that was sensed would be it [m], its share of the confidence.
+_KNOWN, _TWIN = 0.04, 0.8
+
+
+class ShutPart:
+    """A sensed part in the object frame, as if it were shut.
+
+    Attributes: sensed; pose: `T_world_object`; kind; opening; axis; origin; handle: `T_object_handle`; half: of the
+    handle's lengths along the object's axes, and a little more, as far as they show [m].
+    """
+
+    def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
+        self.sensed, self.pose = sensed, pose
+        self.kind: Literal["slide", "hinge"] = sensed.kind
+        to_object = invert(pose)
+        axis = to_object[:3, :3] @ sensed.axis
+        self.axis = _snapped(axis / np.linalg.norm(axis))
+        self.origin = transform(to_object, sensed.origin[None])[0]
+        self.opening = sensed.opening if sensed.opening > AJAR[sensed.kind] else 0.0
+        joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
+        back = motion_of(joint, -self.opening)
+        self.handle = back @ to_object @ sensed.handle
+        self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
+        self.back = back
+        self.half = np.abs(self.handle[:3, 0]) * _USUAL_HALF + 2 * _BESIDE
+
+    def meet_handle(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    ) -> None:
+        """Move a shut part's handle to what stands out of its front there: where it is tells which part is beside which."""
+        front = panel_place(points, normals, self) if self.opening == 0.0 else None
+        if front is not None:
+            label, seen = handle_label(points, self.handle, front)
+            if seen and np.linalg.norm(label.origin - self.handle[:3, 3]) < _MISPLACED:
+                self.handle[:3, 3] = label.origin
+                self.half = np.abs(label.rotation) @ label.extents / 2 + _BESIDE
+
+    def twin(
+        self,
+        others: Sequence[ShutPart],
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+    ) -> ShutPart | None:
+        """The other one of double doors, where its handle shows and was not sensed."""
+        if self.kind == "slide" or self.opening > 0.0:
+            return None
+        front = panel_place(points, normals, self)
+        if front is None:
+            return None
+        label, seen = handle_label(points, self.handle, front)
+        place = twin_of(points, label, front) if seen else None
+        if place is None or any(
+            np.linalg.norm(other.handle[:3, 3] - place) < _KNOWN for other in others
+        ):
+            return None
+        twin = ShutPart(replace(self.sensed, confidence=self.sensed.confidence * _TWIN), self.pose)
+        twin.handle[:3, 3], twin.half = place, self.half
+        # As in a mirror between the two handles.
+        twin.origin[1] = self.handle[1, 3] + place[1] - self.origin[1]
+        twin.axis = self.axis * [-1.0, 1.0, -1.0]
+        return twin
+
+    def turn_as_doors_do(
+        self,
+        others: Sequence[ShutPart],
+        bounds: Float[np.ndarray, "2 3"],
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+    ) -> None:
+        """Where the estimated hinge is no door's, turn about the likely edge."""
+        # What shows open is a door; where its handle is, shut, tells others little.
+        if self.kind == "slide" or (self.opening > 0.0 and abs(self.axis[0]) < _KNOBS):
+            return
+        shut = [other for other in others if other.opening == 0.0 or other.kind == "slide"]
+        between = between_neighbours(self, shut, bounds)
+        if not can_be_a_door(self.origin, self.axis, self.handle, between):
+            front = panel_place(points, normals, self) if self.opening == 0.0 else None
+            if front is not None:
+                facing = points[normals[:, 0] > FACING]
+                between = whole_front(facing, front, self.handle, between)
+            self.handle = invert(self.back) @ self.handle
+            self.opening, self.back = 0.0, np.eye(4)
+            self.origin, self.axis = likely_hinge(self.handle, between)
+
+    def meet_front(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float
+    ) -> None:
+        """Correct how far a drawer is open: shut, its panel is where those of others are, along X [m]."""
+        if self.kind != "slide" or self.opening == 0.0 or self.axis[0] < _SNAP:
+            return
+        own = panel_place(transform(self.back, points), normals, self)
+        if own is not None and abs(own - front) < _MISTAKEN:
+            self.opening += own - front
+            self.back = compose(np.eye(3), -self.opening * self.axis)
+            self.handle[:3, 3] -= (own - front) * self.axis
+
+    def meet_swing(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    ) -> None:
+        """Correct how far a door is open: shut, its panel faces out of the front, or into it."""
+        if self.kind == "slide" or self.opening == 0.0 or abs(self.axis[0]) > 0.1:
+            return
+        local = transform(self.back, points) - self.handle[:3, 3]
+        turned = normals @ self.back[:3, :3].T
+        on = (np.abs(local) < [_BESIDE_HANDLE / 2, _BESIDE_HANDLE, _BESIDE_HANDLE]).all(axis=1)
+        on &= np.abs(turned[:, 0]) > np.cos(_MISSWUNG)
+        if on.sum() < _TELLING:
+            return
+        faces = turned[on] * np.sign(turned[on, :1])
+        ahead = np.cross(self.axis, np.array([1.0, 0.0, 0.0]))  # where X goes as it opens
+        self._turn_back(float(np.median(np.arctan2(faces @ ahead, faces[:, 0]))))
+
+    def _turn_back(self, further: float) -> None:
+        """Take it to be further open than was thought [rad]."""
+        stands = invert(self.back) @ self.handle
+        self.opening += further
+        self.back = motion_of(Joint("hinge", self.origin, self.axis, (0.0, 1.0)), -self.opening)
+        self.handle = self.back @ stands
+        # The handle was taken to be as far open as the panel.
+        self.handle[:3, :3] = _along_axes(self.handle[:3, :3], np.cos(_MISSWUNG))
+
+
+def motion_of(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
+    empty = np.zeros((0, 2, 3))
+    moving = MovingPart("", joint, None, None)
+    return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)
+
+
+def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    nearest = int(np.abs(axis).argmax())
+    if abs(axis[nearest]) < _SNAP:
+        return axis
+    return np.eye(3)[nearest] * np.sign(axis[nearest])
+
+
+def _along_axes(
+    rotation: Float[np.ndarray, "3 3"], least: float = _SNAP
+) -> Float[np.ndarray, "3 3"]:
+    """Along the axes of the body, where that is nearly so: by this cosine or more."""
+    nearest = np.round(rotation)
+    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > least:
+        return nearest
+    return rotation
+
+
+def panel_place(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], part: ShutPart
+) -> float | None:
+    """Where along X the panel behind a handle is [m]; None where it does not show."""
+    facing = normals[:, 0] > FACING
+    local = points[facing] - part.handle[:3, 3]
+    near = (np.abs(local[:, 1:]) < 0.10).all(axis=1) & (local[:, 0] < 0.03)
+    near &= local[:, 0] > -0.09
+    if near.sum() < 30:
+        return None
+    counts, edges = np.histogram(local[near, 0], bins=np.arange(-0.092, 0.034, 0.003))
+    smooth = np.convolve(counts, np.ones(3), mode="same")
+    best = int(smooth.argmax())
+    close = near & (np.abs(local[:, 0] - edges[best] - 0.0015) < 0.006)
+    return float(np.median(local[close, 0]) + part.handle[0, 3])
+
+
+def between_neighbours(
+    part: ShutPart, others: Sequence[ShutPart], bounds: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """Of the body, what is nearer to a part's handle than to those of others: low and high corner."""
+    low, high = bounds[0].copy(), bounds[1].copy()
+    own, half = part.handle[:3, 3], part.half
+    for other in others:
+        if other is part or other.sensed.confidence < 0.15:
+            continue
+        away = other.handle[:3, 3] - own
+        axis = 2 if abs(away[2]) > abs(away[1]) else 1
+        if abs(away[axis]) < 0.05:
+            continue
+        middle = own[axis] + away[axis] / 2
+        if away[axis] > 0:
+            high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
+        else:
+            low[axis] = max(low[axis], min(middle, own[axis] - half[axis]))
+    return np.stack([low, high])
