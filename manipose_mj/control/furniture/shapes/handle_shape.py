@@ -19,9 +19,8 @@ _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
 _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
 _FACES = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _THIN_BAR, _USUAL_DEPTH = 0.010, 0.012  # how deep bars are at least, and are kept clear of [m]
-# Across and along a bar: of cells whose number tells how much of its length shows there [m]; the share of the most, under
-# which it counts as noise.
-_CELL, _RARE = np.array([0.002, 0.006]), 0.3
+_STRIP = 0.002  # of a bar, along it [m]
+_RARE = 0.08  # share of a bar's points that counts as noise, on either side
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -60,7 +59,7 @@ def _measured(
     along = run_around(local[on, 0], 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
     length = max(along[1] - along[0], 0.012)
-    sides = _sides(local[on])
+    sides = _sides(local[on, 2])
     across = float(np.ptp(sides))
     front_side = float(np.percentile(local[on, 1], 85))
     middle = handle[:3, 3] + handle[:3, 2] * float(sides.mean())
@@ -83,18 +82,19 @@ def _measured(
     return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
 
 
-def _sides(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "2"]:
-    """Where a bar ends across, from its points in its own frame [m].
+def _sides(across: Float[np.ndarray, "n"]) -> Float[np.ndarray, "2"]:
+    """Where a bar ends across, from where its points are there [m].
 
-    Of the bar, its front shows, and often a side, with more points than the front: what counts is where there are points
-    over much of its length, not how many. Neighbouring surfaces bleed into outlines: what is rare counts as noise.
+    Of the bar, its front shows, and often a side, with more points than the front: each strip along the bar counts at most
+    as much as the median of them. Neighbouring surfaces bleed into outlines: what is rare counts as noise.
     """
-    cells = np.unique(np.floor(points[:, [2, 0]] / _CELL).astype(int), axis=0)
-    places, lengths = np.unique(cells[:, 0], return_counts=True)
-    often = places[lengths > _RARE * lengths.max()]
-    ends = _CELL[0] * np.array([often.min(), often.max() + 1])
-    near = (points[:, 2] >= ends[0]) & (points[:, 2] <= ends[1])
-    return np.stack([points[near, 2].min(), points[near, 2].max()])
+    _, number, counts = np.unique(
+        np.floor(across / _STRIP), return_inverse=True, return_counts=True
+    )
+    most = np.median(counts[counts > 1]) if (counts > 1).any() else 1.0
+    order = np.argsort(across)
+    share = np.cumsum(np.minimum(most / counts, 1.0)[number][order])
+    return across[order][np.searchsorted(share, np.array([_RARE, 1 - _RARE]) * share[-1])]
 
 
 def run_around(along: Float[np.ndarray, "n"], gap: float) -> tuple[float, float]:
