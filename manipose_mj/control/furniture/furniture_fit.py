@@ -39,7 +39,7 @@ _FACE, _FACE_LEAST = 0.012, 150
 _FREE_EDGE = 0.05  # of a door, from its handle [m]
 _TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
-_UNSEEN = 0.4  # of its confidence that is left to a handle of which no point shows
+_UNSEEN = 0.15  # of its confidence that is left to a handle of which no point shows
 _MEET = 0.01  # handles nearer than this are one [m]
 _LOOKS = 500
 
@@ -57,9 +57,10 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     normals = cloud.normals @ pose[:3, :3]
     shut = [ShutPart(part, pose) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
-    for part in shut:
-        part.meet_handle(points, normals)
+    lost = [part for part in shut if not part.meet_handle(points, normals)]
     if category not in WITH_KNOBS:
+        for part in lost:
+            part.find_handle(shut, points, normals)
         shut += [twin for part in shut if (twin := part.twin(shut, points, normals))]
         for part in shut:
             part.turn_as_doors_do(shut, bounds, points, normals)

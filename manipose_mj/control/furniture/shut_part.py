@@ -15,8 +15,8 @@ from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge
 from manipose_mj.control.furniture.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
-from manipose_mj.control.furniture.shapes.handle_shape import handle_label
-from manipose_mj.control.furniture.shapes.twin_handle import twin_of
+from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
+from manipose_mj.control.furniture.shapes.standing_out import nearest_of, twin_of
 from manipose_mj.poses import compose, invert, transform
 
 FACING = 0.6  # cosine between normals of the front and X, at least
@@ -29,6 +29,8 @@ _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 _USUAL_HALF, _BESIDE = 0.05, 0.005
 _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
+_OUT = 0.9  # cosine between a handle's Y and the way out of the front, at least
+_LONG = 1.5  # times as long as wide: a bar
 # Of the other one of double doors: how near a handle that was sensed would be it [m], its share of the confidence.
 _KNOWN, _TWIN = 0.04, 0.8
 
@@ -57,14 +59,51 @@ class ShutPart:
 
     def meet_handle(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
-    ) -> None:
-        """Move a shut part's handle to what stands out of its front there: where it is tells which part is beside which."""
+    ) -> bool:
+        """Move a shut part's handle to what stands out of its front there: where it is tells which part is beside which.
+
+        Returns:
+          Whether its handle shows, or is not looked for: the part is open, or its front does not show.
+        """
         front = panel_place(points, normals, self) if self.opening == 0.0 else None
-        if front is not None:
-            label, seen = handle_label(points, self.handle, front)
-            if seen and np.linalg.norm(label.origin - self.handle[:3, 3]) < _MISPLACED:
-                self.handle[:3, 3] = label.origin
-                self.half = np.abs(label.rotation) @ label.extents / 2 + _BESIDE
+        if front is None:
+            return True
+        if np.abs(self.handle[:3, :3]).max(axis=0).min() < _SNAP and self.handle[0, 1] > _OUT:
+            self._straighten(points, front)
+        label, seen = handle_label(points, self.handle, front)
+        if seen and np.linalg.norm(label.origin - self.handle[:3, 3]) < _MISPLACED:
+            self.handle[:3, 3] = label.origin
+            self.half = np.abs(label.rotation) @ label.extents / 2 + _BESIDE
+        return seen
+
+    def _straighten(self, points: Float[np.ndarray, "n 3"], front: float) -> None:
+        """Bars are upright or level; of a knob either does. What seems to be askew is whichever shows more of a bar."""
+        slender: list[tuple[float, Float[np.ndarray, "3 3"]]] = []
+        for turn in (UP_FRONT, ACROSS_FRONT):
+            label, seen = handle_label(points, compose(turn, self.handle[:3, 3]), front)
+            if seen:
+                slender.append((float(label.extents[0] / label.extents[2]), turn))
+        if slender:
+            self.handle[:3, :3] = max(slender, key=lambda each: each[0])[1]
+
+    def find_handle(
+        self,
+        others: Sequence[ShutPart],
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+    ) -> None:
+        """Where no handle shows, take what stands out of the front nearest to it."""
+        front = panel_place(points, normals, self)
+        if front is None or self.sensed.certain:
+            return
+        taken = np.array([o.handle[:3, 3] for o in others if o is not self]).reshape(-1, 3)
+        found = nearest_of(points, self.handle[:3, 3], front, taken)
+        if found is None:
+            return
+        (across, upright), self.handle[:3, 3] = found[1], found[0]
+        if max(across, upright) > _LONG * min(across, upright):
+            self.handle[:3, :3] = UP_FRONT if upright > across else ACROSS_FRONT
+        self.meet_handle(points, normals)
 
     def twin(
         self,

@@ -174,9 +174,9 @@ class EstimatedPerception:
         self.observe()  # where parts and objects are by now
         self._world.look_again(self._keys())
         self._find_objects()
+        self._build()
         for name in self.unseen:
             raise StageFailure("perception", f"no camera sees enough of {name}, opened or not")
-        self._build()
 
     @property
     def _needed(self) -> set[str]:

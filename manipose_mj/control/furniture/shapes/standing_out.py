@@ -1,0 +1,125 @@
+"""What stands out of a front as handles do: the other one of a pair, and one near where none was."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy import ndimage
+
+from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.furniture.shapes.handle_shape import run_around
+
+_STANDING = (0.012, 0.09)  # how far points of handles are before the front [m]
+_APART = 0.16  # of the two, at most [m]
+_GAP = 0.015  # between handles at least, across [m]
+_AS_HIGH = 0.03  # how far both may differ, upright [m]
+_AS_WIDE = 0.02  # the same, across [m]
+_AS_MANY = 0.4  # of the points of one that the other shows, at least
+_FEW = 12  # points of a handle, at least
+# Of what is looked for where no handle is: how far away [m], the side of a cell [m], points in one; the longest and the
+# widest handle [m]; a margin around it, and how near the front it shows the front [m], on so many of four sides.
+_FAR, _CELL, _IN_CELL = 0.40, 0.008, 2
+_OUT = 0.008  # how far it stands out, at least [m]
+_LONGEST, _WIDEST = 0.35, 0.06
+_AROUND, _FLUSH, _SIDES = 0.025, 0.008, 3
+
+
+def twin_of(
+    points: Float[np.ndarray, "n 3"], handle: PoseLabel, front: float
+) -> Float[np.ndarray, "3"] | None:
+    """Where another handle of the same size stands out of the front beside one; None where there is none.
+
+    Args:
+      points: Of the furniture, object frame, X out of the front and Z up [m].
+      handle: Of a shut door, object frame.
+      front: Of it, along X [m].
+    """
+    half = np.abs(handle.rotation) @ handle.extents / 2
+    local = points - handle.origin
+    ahead = points[:, 0] - front
+    row = (ahead > _STANDING[0]) & (ahead < _STANDING[1])
+    row &= (np.abs(local[:, 1]) < _APART + half[1]) & (np.abs(local[:, 2]) < half[2] + _AS_HIGH)
+    own = row & (np.abs(local[:, 1]) < half[1] + _GAP / 2)
+    if own.sum() < _FEW:
+        return None
+    beside = [
+        _run(local, row & (np.sign(local[:, 1]) == side) & ~own, side) for side in (-1.0, 1.0)
+    ]
+    twins = [local[on] for on in beside if _alike(local[own], local[on])]
+    if not twins:
+        return None
+    middles = [(twin.min(axis=0) + twin.max(axis=0)) / 2 for twin in twins]
+    nearest = min(middles, key=lambda middle: abs(middle[1]))
+    return handle.origin + np.array([0.0, nearest[1], 0.0])
+
+
+def nearest_of(
+    points: Float[np.ndarray, "n 3"],
+    place: Float[np.ndarray, "3"],
+    front: float,
+    taken: Float[np.ndarray, "k 3"],
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "2"]] | None:
+    """The middle of what stands out of a front nearest to a place, and its size across and upright; None if nothing does.
+
+    Args:
+      points: Of the furniture, object frame, X out of the front and Z up [m].
+      place: Where a handle should be, object frame [m].
+      front: Of the part, along X [m].
+      taken: Handles of other parts, object frame [m].
+    """
+    local, ahead = points - place, points[:, 0] - front
+    near = (np.abs(local[:, 1:]) < _FAR).all(axis=1)
+    out = near & (ahead > _OUT) & (ahead < _STANDING[1])
+    flush = local[near & (np.abs(ahead) < _FLUSH), 1:]
+    if out.sum() < _FEW:
+        return None
+    cells = np.floor((local[out, 1:] + _FAR) / _CELL).astype(int)
+    counts = np.zeros((round(2 * _FAR / _CELL) + 1,) * 2, int)
+    np.add.at(counts, tuple(cells.T), 1)
+    names, _ = ndimage.label(counts >= _IN_CELL, structure=np.ones((3, 3)))
+    of = names[tuple(cells.T)]
+    found = []
+    for name in range(1, names.max() + 1):
+        own = local[out][of == name]
+        low, high = own.min(axis=0), own.max(axis=0)
+        size, middle = (high - low)[1:], (low + high) / 2
+        fits = len(own) >= _FEW and size.max() < _LONGEST and size.min() < _WIDEST
+        free = not len(taken) or np.abs(taken - place - middle)[:, 1:].max(axis=1).min() > _WIDEST
+        if fits and free and _shown_around(flush, low[1:], high[1:]) >= _SIDES:
+            found.append((float(np.linalg.norm(middle[1:])), place + middle, size))
+    return min(found, key=lambda each: each[0])[1:] if found else None
+
+
+def _shown_around(
+    flush: Float[np.ndarray, "n 2"], low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]
+) -> int:
+    """On how many of the four sides of a rectangle the front shows."""
+    beside = (flush > low - _AROUND) & (flush < high + _AROUND)
+    within = (flush > low) & (flush < high)
+    sides = 0
+    for axis in range(2):
+        strip = beside[:, axis] & within[:, 1 - axis]
+        for on in (flush[:, axis] < low[axis], flush[:, axis] > high[axis]):
+            sides += int((strip & on).sum()) >= _FEW
+    return sides
+
+
+def _run(
+    local: Float[np.ndarray, "n 3"], on: Bool[np.ndarray, "n"], side: float
+) -> Bool[np.ndarray, "n"]:
+    """Of these points, the first run across without a gap."""
+    if not on.any():
+        return on
+    away = side * local[:, 1]
+    first = float(away[on].min())
+    _, end = run_around(away[on] - first, _GAP)
+    return on & (away <= first + end)
+
+
+def _alike(one: Float[np.ndarray, "n 3"], other: Float[np.ndarray, "m 3"]) -> bool:
+    """Whether two sets of points may show two handles of one kind."""
+    if len(other) < max(_FEW, _AS_MANY * len(one)):
+        return False
+    differ = np.abs(np.ptp(other, axis=0) - np.ptp(one, axis=0))
+    level = abs(float(np.median(other[:, 2]) - np.median(one[:, 2])))
+    return bool(differ[1] < _AS_WIDE and differ[2] < _AS_HIGH and level < _AS_HIGH / 2)
