@@ -8,7 +8,7 @@ import pytest
 from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
-from manipose_mj.poses import compose, rotation_about
+from manipose_mj.poses import compose, rotation_about, transform
 from tests.control.furniture.synthetic import FRONT, HALF, body, cloud, door, rectangle
 
 X, Y, Z = np.eye(3)
@@ -129,3 +129,41 @@ def test_a_bar_that_shows_more_of_its_side_than_of_its_front_is_as_wide_as_its_f
     assert seen
     assert label.origin[1] == pytest.approx(0.0, abs=0.003)
     assert label.extents[2] == pytest.approx(0.014, abs=0.004)
+
+
+def test_a_stray_point_between_two_knobs_makes_no_bar_of_them():
+    stray = (np.array([[FRONT + 0.03, 0.0, 0.30]]), X[None])
+    level = compose(ACROSS_FRONT, np.array([FRONT + 0.03, -0.03, 0.30]))
+    part = sensed("hinge", [0.0, 0.0, 0.0], handle=level)
+    dense = [
+        (points + shift, normals)
+        for points, normals in (knob(-0.03), knob(0.03))
+        for shift in 0.001 * np.array([[0, a, b] for a in range(4) for b in range(4)])
+    ]
+    model = fit_furniture(cloud([*body(), *dense, stray]), SensedFurniture(X, (part,)), "cabinet")
+    widths = [found.part.handle.extents[0] for found in model.parts if found.part.handle]
+    assert len(widths) == 2
+    assert max(widths) < 0.04
+
+
+def test_a_handle_that_was_sensed_elsewhere_is_found_where_it_stands_out():
+    part = sensed("hinge", [FRONT + 0.03, 0.1, 0.12], origin=np.array([FRONT, HALF, 0.0]), axis=Z)
+    model = fit_furniture(cloud([*body(), knob(-0.1)]), SensedFurniture(X, (part,)), "cabinet")
+    (found,) = model.parts
+    assert found.part.handle is not None
+    (place,) = transform(model.pose, found.part.handle.origin[None])
+    np.testing.assert_allclose(place[1:], [-0.1, 0.30], atol=0.006)
+    assert found.confidence == part.confidence
+    unseen = fit_furniture(cloud(body()), SensedFurniture(X, (part,)), "cabinet")
+    assert unseen.parts[0].confidence < 0.5 * part.confidence
+
+
+def test_a_bar_that_was_sensed_askew_is_level_or_upright():
+    bar = rectangle(np.array([FRONT + 0.03, -0.006, 0.2]), 0.012 * Y, 0.12 * Z, X)
+    askew = compose(rotation_about(X, 0.7) @ UP_FRONT, np.array([FRONT + 0.03, 0.0, 0.26]))
+    part = sensed("slide", [FRONT + 0.03, 0.0, 0.26], handle=askew)
+    model = fit_furniture(cloud([*body(), bar]), SensedFurniture(X, (part,)), "cabinet")
+    label = model.parts[0].part.handle
+    assert label is not None
+    np.testing.assert_allclose(label.rotation, UP_FRONT, atol=1e-6)
+    assert label.extents[0] == pytest.approx(0.12, abs=0.01)

@@ -20,6 +20,7 @@ _USUAL_HEIGHT = 0.03  # of a handle before its panel [m]
 _FACES = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _THIN_BAR, _USUAL_DEPTH = 0.010, 0.012  # how deep bars are at least, and are kept clear of [m]
 _STRIP = 0.002  # of a bar, along it [m]
+_STRAY = 0.15  # of the points of a usual strip, up to which others are stray
 _RARE = 0.08  # share of a bar's points that counts as noise, on either side
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
@@ -56,7 +57,7 @@ def _measured(
     if on.sum() < 12:
         usual = np.array([0.10, 0.012, 0.012])
         return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
-    along = run_around(local[on, 0], 0.025)
+    along = run_around(_often(local[on, 0]), 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
     length = max(along[1] - along[0], 0.012)
     sides = _sides(local[on, 2])
@@ -80,6 +81,14 @@ def _measured(
         extents = np.array([side, depth, side])
         rotation = ACROSS_FRONT if handle[0, 1] > _FACES else rotation
     return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
+
+
+def _often(along: Float[np.ndarray, "n"]) -> Float[np.ndarray, "m"]:
+    """Of places along a bar, those where there are many: a stray point joins two knobs that are side by side."""
+    _, number, counts = np.unique(
+        np.floor(along / (2 * _STRIP)), return_inverse=True, return_counts=True
+    )
+    return along[counts[number] > _STRAY * np.median(counts)]
 
 
 def _sides(across: Float[np.ndarray, "n"]) -> Float[np.ndarray, "2"]:

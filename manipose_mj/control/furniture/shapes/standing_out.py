@@ -107,13 +107,16 @@ def _shown_around(
 def _run(
     local: Float[np.ndarray, "n 3"], on: Bool[np.ndarray, "n"], side: float
 ) -> Bool[np.ndarray, "n"]:
-    """Of these points, the first run across without a gap."""
-    if not on.any():
-        return on
+    """Of these points, the first run across without a gap that is more than stray points."""
     away = side * local[:, 1]
-    first = float(away[on].min())
-    _, end = run_around(away[on] - first, _GAP)
-    return on & (away <= first + end)
+    while on.any():
+        first = float(away[on].min())
+        _, end = run_around(away[on] - first, _GAP)
+        run = on & (away <= first + end)
+        if run.sum() >= _FEW:
+            return run
+        on = on & ~run
+    return on
 
 
 def _alike(one: Float[np.ndarray, "n 3"], other: Float[np.ndarray, "m 3"]) -> bool:
