@@ -273,7 +273,8 @@ class Primitives:
             except StageFailure:
                 if not part.goes_on or opening < before:
                     raise
-                self._executor.pushed(name, before)  # as open as anybody can tell
+                part = self._executor.observe().parts[name]
+                self._executor.pushed(name, part.opening)  # as open as anybody can tell
                 return
             part = self._executor.observe().parts[name]
             # An estimated part is sent beyond: it need not come back.

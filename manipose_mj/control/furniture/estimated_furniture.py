@@ -273,7 +273,8 @@ class EstimatedFurniture:
         if stopped:
             self._before[name] = started  # a hand that slips goes on without the part
         low, high = part.part.joint.range
-        if is_level(joint.axis) != is_level(part.part.joint.axis):
+        turned = is_level(joint.axis) != is_level(part.part.joint.axis)
+        if joint.kind == "hinge" and turned:
             # What was taken for a flap goes as a door does, or the other way round.
             high = usual_swing(joint.axis, model.category)
         ends = stopped and self._stops.is_end(name, joint.kind, opening, high)

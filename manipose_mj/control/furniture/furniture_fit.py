@@ -11,10 +11,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import (
-    WITH_KNOBS,
-    usual_swing,
-)
+from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, usual_swing
 from manipose_mj.control.furniture.object_frame import object_pose
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.scene_cloud import SceneCloud

@@ -191,6 +191,7 @@ class ShutPart:
 
 
 def motion_of(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
+    """How a part moves that opens so far [m or rad], object frame."""
     empty = np.zeros((0, 2, 3))
     moving = MovingPart("", joint, None, None)
     return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)
