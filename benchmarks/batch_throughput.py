@@ -34,6 +34,7 @@ from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 TURNS = 5
 HELD = 25  # control steps for which a random target is held
+JACOBIANS = ("dense", "sparse")  # in MuJoCo's order
 SPREAD = 0.6  # of random targets about the start [rad]
 COLUMNS = (
     "task", "worlds", "environment steps/s", "physics steps/s", "bare physics steps/s", "share", "contacts",
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--processes", type=int, default=1, help="of engine c")
     parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
     parser.add_argument("--impratio", type=float, help="instead of the model's own")
+    parser.add_argument("--jacobian", choices=JACOBIANS, help="instead of the model's own")
     parser.add_argument(
         "--room", nargs=2, type=int, metavar=("CONTACTS", "ROWS"), help="of a world, of engine warp"
     )
@@ -69,6 +71,8 @@ def measure(task: str, arguments: argparse.Namespace) -> None:
             model.opt.noslip_iterations = arguments.noslip
         if arguments.impratio is not None:
             model.opt.impratio = arguments.impratio
+        if arguments.jacobian is not None:
+            model.opt.jacobian = JACOBIANS.index(arguments.jacobian)
     options = pool.scenes[0].opt
     print(
         f"{len(pool.starts)} starts of {len(pool.scenes)} scenes; {pool.scenes[0].ngeom} geoms; "

@@ -1,6 +1,6 @@
 """Print how many grasp trials a second engine `warp` makes, and how often engine `c` comes to the same verdicts.
 
-python benchmarks/batch/grasp_trials.py FOLDER_OF_ASSETS [--places 4] [--jobs N]
+python benchmarks/batch/grasp_trials.py FOLDER_OF_ASSETS [--places 4] [--jobs N] [--set jacobian=1 ...]
 
 Every grasp of every asset is tried with four frictions and some places of the hand. Both engines try each grasp with
 the hand at its place. Times are those of a second run, without compiling.
@@ -29,6 +29,13 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=16384, help="at the same time")
     parser.add_argument("--jobs", type=int, default=1, help="processes of engine c")
     parser.add_argument("--most", type=int, default=50, help="assets")
+    parser.add_argument(
+        "--set",
+        nargs="+",
+        default=[],
+        metavar="OPTION=NUMBER",
+        help="of `mujoco.MjOption`, for engine warp alone: jacobian=1 is sparse, cone=0 pyramids",
+    )
     arguments = parser.parse_args()
     gripper, config = ParallelJaw(), TrialConfig()
     print(
@@ -44,6 +51,9 @@ def main() -> None:
             asset.grasps, asset.stable_poses, gripper, GridConfig(places=arguments.places)
         )
         trial = GridTrial(asset.model_path, gripper, config)
+        for option in arguments.set:
+            name, number = option.split("=")
+            setattr(trial.model.opt, name, int(number))
         started = time.perf_counter()
         batch = Batch(trial, min(arguments.worlds, len(grid)))
         batch.held(grid.part(slice(0, 1)))
