@@ -16,6 +16,7 @@ _SIDE_LEAST, _SIDE_SHARE = (
     6,
     0.25,
 )  # points of a bin that is a side; of the fullest bin of that side
+_STRAY = 5  # of the points of a side's first bins, those before it [%]
 _MIDDLE = 0.5  # share of the opening about its middle in which a side is looked for
 _FACING, _FLAT = 0.75, 0.8  # cosines of normals to an axis
 _STEP, _LEVEL = 0.004, 0.006  # between heights of surfaces, and of points from theirs [m]
@@ -82,7 +83,12 @@ def _side(values: Float[np.ndarray, "n"], middle: float, sign: float) -> float |
         return None
     counts, edges = np.histogram(away, np.arange(0.0, away.max() + 2 * _BIN, _BIN))
     full = counts >= max(_SIDE_LEAST, _SIDE_SHARE * counts.max())
-    return middle + sign * float(edges[int(full.argmax())]) if full.any() else None
+    if not full.any():
+        return None
+    begins = edges[int(full.argmax())]
+    # Where in its first bins it does.
+    first = away[(away >= begins) & (away < begins + 2 * _BIN)]
+    return middle + sign * float(np.percentile(first, _STRAY))
 
 
 @dataclass(frozen=True)

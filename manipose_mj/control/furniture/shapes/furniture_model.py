@@ -17,7 +17,7 @@ from manipose_mj.poses import compose, rotation_about
 
 _TRAY_FLOOR, _TRAY_SIDE = 0.008, 0.012  # of drawers [m]
 _TRAY_BEHIND = (
-    0.02  # of a drawer that the body still covers when it is wide open: its back does not show [m]
+    0.04  # of a drawer that the body still covers when it is wide open: its back does not show [m]
 )
 _EDGE = 0.02  # by which panels overlap at their edges without being over one another [m]
 _BEFORE_FRONT = 0.03  # by how much a hole reaches out of the front [m]
