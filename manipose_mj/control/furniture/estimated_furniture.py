@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from dm_control import mjcf
 from jaxtyping import Bool, Float
+from scipy.spatial import cKDTree
 
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.door_hinge import is_level, usual_swing
@@ -86,7 +87,7 @@ class EstimatedFurniture:
         self.model: FurnitureModel | None = None
         self._mask = 0
         self._held: _Held | None = None
-        self._moved: set[str] = set()
+        self._moved: dict[str, bool] = {}  # parts that may have; whether the hand touched them
         self._stops, self._swings = Stops(), Swings()
         # Hinges that an open panel or a long arc of the hand has shown.
         self._sure: dict[str, Joint] = {}
@@ -100,7 +101,7 @@ class EstimatedFurniture:
         Raises:
           StageFailure: No part is found that a goal could mean.
         """
-        self.model, self._held, self._moved = None, None, set()
+        self.model, self._held, self._moved = None, None, {}
         self._before, self._sure = {}, {}
         self._stops, self._swings = Stops(), Swings()
         for category, mask in self._task.furniture_masks:
@@ -215,7 +216,7 @@ class EstimatedFurniture:
         """The hand holds this from now on."""
         part = self._part(name)
         if self._held is not None:
-            self._moved.add(self._held.name)
+            self._moved[self._held.name] = True
         self._held = None
         if part is not None and self.model is not None:
             back = invert(part.motion(part.opening)) @ invert(self.model.pose)
@@ -237,17 +238,19 @@ class EstimatedFurniture:
         touched = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
         if touched:
             points, hidden = self._points(), self._hidden()
+            tree = cKDTree(points)
             for part in touched:
                 before = self._before.pop(part.name, None)
-                opening = found_opening(part, points, hidden, before)
+                handled = self._moved.get(part.name, False)
+                opening = found_opening(part, points, hidden, before, tree=tree, touched=handled)
                 known = part.part.joint.range[1]
                 if self._shall_open_wide(part):
                     known = self._swings.end(part.name, opening, known)
                 part = part.at(opening).opening_to(known)
                 self.model = self.model.with_part(part) if self.model else None
-        self._moved = {
-            part.name for part in touched if self._near(part, tcp_pose)
-        }  # looked at again until the hand is gone
+        # Looked at again until the hand is gone.
+        near = [part.name for part in touched if self._near(part, tcp_pose)]
+        self._moved = {name: self._moved.get(name, False) for name in near}
 
     def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """Correct a joint by the way the hand went with the part; where it stopped, it goes no further.
@@ -302,7 +305,7 @@ class EstimatedFurniture:
             self._before[name] = part.opening
             self._swings.pushed(name, opening)
             self.model = self.model.with_part(part.at(max(opening, 0.0)))
-            self._moved.add(name)
+            self._moved[name] = True
 
     def look_again(self) -> None:
         """Measure panels and cavities of what stands open."""

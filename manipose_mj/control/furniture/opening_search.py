@@ -16,6 +16,7 @@ _STEPS = {"slide": (0.01, 0.002), "hinge": (0.06, 0.01)}  # of the search, coars
 _BEYOND = {"slide": 0.04, "hinge": 0.5}  # openings beyond the usual that are looked at
 _WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
+_FITS = 0.003  # misfit up to which a part that nobody touched is where it was [m]
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESSES = (
     0.010,
@@ -42,6 +43,9 @@ def found_opening(
     points: Float[np.ndarray, "n 3"],
     hidden: Hidden | None = None,
     before: float | None = None,
+    *,
+    tree: cKDTree | None = None,
+    touched: bool = True,
 ) -> float:
     """The opening [m or rad] near the present one that fits best; the present one where none is clearly better.
 
@@ -54,10 +58,15 @@ def found_opening(
       hidden: Which points, object frame [m], no camera can see for what is in front of them; None: nobody knows.
       before: An opening that the part had before somebody tried to move it to the present one: it may be anywhere in
         between.
+      tree: Of the points, where several parts are looked for among them.
+      touched: Whether the hand held or pushed it. What it did not is where it was, if it fits there.
     """
     if len(part.looks) < 20 or len(points) < 50:
         return part.opening
-    kind, misfit = part.part.joint.kind, _misfits(part, points, hidden)
+    misfit = _misfits(part, cKDTree(points) if tree is None else tree, hidden)
+    if not touched and misfit(part.opening) < _FITS:
+        return part.opening
+    kind = part.part.joint.kind
     coarse, fine = _STEPS[kind]
     ends = [part.opening, part.opening if before is None else before]
     least = max(min(ends) - _WITHIN[kind], 0.0)
@@ -78,15 +87,12 @@ def misfit(
     part: PartModel, points: Float[np.ndarray, "n 3"], hidden: Hidden | None = None
 ) -> float:
     """How far the looks of a part, as it stands, are from what is seen [m]; arguments as of `found_opening`."""
-    return _misfits(part, points, hidden)(part.opening)
+    return _misfits(part, cKDTree(points), hidden)(part.opening)
 
 
-def _misfits(
-    part: PartModel, points: Float[np.ndarray, "n 3"], hidden: Hidden | None
-) -> Callable[[float], float]:
+def _misfits(part: PartModel, tree: cKDTree, hidden: Hidden | None) -> Callable[[float], float]:
     """The misfit at any opening."""
     looks, kind = part.looks[:_MOST], part.part.joint.kind
-    tree = cKDTree(points)
     # A door that stands wide open turns its other side to the cameras; a drawer never does.
     sides = [looks]
     if kind == "hinge":

@@ -67,6 +67,15 @@ def test_an_opening_is_found_near_where_the_hand_left_the_part(kind, truth, off,
     assert found_opening(part.at(truth + off), points) == pytest.approx(truth, abs=most)
 
 
+@pytest.mark.parametrize(("assumed", "found"), [(0.302, 0.302), (0.27, 0.30), (0.0, 0.30)])
+def test_what_nobody_touched_is_where_it_was_if_it_fits_there(assumed, found):
+    part = a_part("slide")
+    points = transform(part.motion(0.30), part.looks)
+    tree = cKDTree(points)
+    seen = found_opening(part.at(assumed), points, before=0.30, tree=tree, touched=False)
+    assert seen == pytest.approx(found, abs=1e-9 if assumed == found else 0.004)
+
+
 def test_a_drawer_that_is_open_shows_its_floor_and_sides():
     part, opening = a_part("slide").at(0.25), 0.25
     floor = plane([FRONT - opening, -0.18, 0.12], [0.18, 0.18, 0.12])
