@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from batch.solver_options import add_set, set_options
 from mujoco import rollout
 
 from manipose_mj import batch
@@ -34,7 +35,6 @@ from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 TURNS = 5
 HELD = 25  # control steps for which a random target is held
-JACOBIANS = ("dense", "sparse")  # in MuJoCo's order
 SPREAD = 0.6  # of random targets about the start [rad]
 COLUMNS = (
     "task", "worlds", "environment steps/s", "physics steps/s", "bare physics steps/s", "share", "contacts",
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--processes", type=int, default=1, help="of engine c")
     parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
     parser.add_argument("--impratio", type=float, help="instead of the model's own")
-    parser.add_argument("--jacobian", choices=JACOBIANS, help="instead of the model's own")
+    add_set(parser, "instead of the model's own")
     parser.add_argument(
         "--room", nargs=2, type=int, metavar=("CONTACTS", "ROWS"), help="of a world, of engine warp"
     )
@@ -71,8 +71,7 @@ def measure(task: str, arguments: argparse.Namespace) -> None:
             model.opt.noslip_iterations = arguments.noslip
         if arguments.impratio is not None:
             model.opt.impratio = arguments.impratio
-        if arguments.jacobian is not None:
-            model.opt.jacobian = JACOBIANS.index(arguments.jacobian)
+        set_options(model, arguments.set)
     options = pool.scenes[0].opt
     print(
         f"{len(pool.starts)} starts of {len(pool.scenes)} scenes; {pool.scenes[0].ngeom} geoms; "

@@ -12,6 +12,8 @@ import argparse
 import time
 from pathlib import Path
 
+from solver_options import add_set, set_options
+
 from asset_pipeline.build.grasp_trial import TrialConfig
 from asset_pipeline.grasp_survival.engine_c import held_c
 from asset_pipeline.grasp_survival.engine_warp import Batch
@@ -29,13 +31,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=16384, help="at the same time")
     parser.add_argument("--jobs", type=int, default=1, help="processes of engine c")
     parser.add_argument("--most", type=int, default=50, help="assets")
-    parser.add_argument(
-        "--set",
-        nargs="+",
-        default=[],
-        metavar="OPTION=NUMBER",
-        help="of `mujoco.MjOption`, for engine warp alone: jacobian=1 is sparse, cone=0 pyramids",
-    )
+    add_set(parser, "for engine warp alone")
     arguments = parser.parse_args()
     gripper, config = ParallelJaw(), TrialConfig()
     print(
@@ -51,9 +47,7 @@ def main() -> None:
             asset.grasps, asset.stable_poses, gripper, GridConfig(places=arguments.places)
         )
         trial = GridTrial(asset.model_path, gripper, config)
-        for option in arguments.set:
-            name, number = option.split("=")
-            setattr(trial.model.opt, name, int(number))
+        set_options(trial.model, arguments.set)
         started = time.perf_counter()
         batch = Batch(trial, min(arguments.worlds, len(grid)))
         batch.held(grid.part(slice(0, 1)))

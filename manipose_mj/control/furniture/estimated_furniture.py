@@ -235,11 +235,11 @@ class EstimatedFurniture:
             opening = opening_of(part.part.joint, self._held.start, now)
             self.model = model.with_part(part.at(opening))
             return
-        touched = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
-        if touched:
+        suspected = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
+        if suspected:
             points, hidden = self._points(), self._hidden()
             tree = cKDTree(points)
-            for part in touched:
+            for part in suspected:
                 before = self._before.pop(part.name, None)
                 handled = self._moved.get(part.name, False)
                 opening = found_opening(part, points, hidden, before, tree=tree, touched=handled)
@@ -249,7 +249,7 @@ class EstimatedFurniture:
                 part = part.at(opening).opening_to(known)
                 self.model = self.model.with_part(part) if self.model else None
         # Looked at again until the hand is gone.
-        near = [part.name for part in touched if self._near(part, tcp_pose)]
+        near = [part.name for part in suspected if self._near(part, tcp_pose)]
         self._moved = {name: self._moved.get(name, False) for name in near}
 
     def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
