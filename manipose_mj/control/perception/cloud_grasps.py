@@ -105,4 +105,5 @@ def _from_above(
     level = frames.levelled(up, _LEVEL).take(slice(_LEVEL_PAIRS))
     free = hand_free(cloud.coarse, level, gripper)
     free[:, len(DEPTHS) :] = False  # of the approaches the first is the one from above
-    return fit_pairs(cloud, level, free, gripper)
+    reached = np.flatnonzero(free.any(axis=1))
+    return fit_pairs(cloud, level.take(reached), free[reached], gripper)

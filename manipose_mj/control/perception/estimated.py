@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ class EstimatedPerception:
         self._views = ObjectViews(task.task_observables, usual)
         self._more_views = ObjectViews(task.task_observables, names)
         self._known: dict[str, SensedPose] = {}
-        self._grasps: dict[str, GraspSet] = {}
+        self._grasps: dict[str, Callable[[], GraspSet]] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
         self._held_width = 0.0  # of the gripper then [m]
         self._dropped: set[str] = (
@@ -302,8 +303,8 @@ class EstimatedPerception:
             return replace(sensed, confidence=max(sensed.confidence, second.confidence))
         return second if second.confidence > sensed.confidence else sensed
 
-    def _grasps_of(self, name: str) -> GraspSet:
-        """For the pose estimated and those that goals ask for."""
+    def _grasps_of(self, name: str) -> Callable[[], GraspSet]:
+        """Samples grasps of what is seen now, for the pose estimated and those that goals ask for; once, when asked to."""
         symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
         frames = [goal.goal_frame(symmetries) for goal in self._task.goals]
         rotations = [
@@ -311,13 +312,16 @@ class EstimatedPerception:
             for frame in frames
             if frame is not None and frame.object == name and frame.rotation_counts
         ]
-        return sensed_grasps(
-            self._grasp_source,
-            self._known[name],
-            self._views.of(self._physics, name) or self._more_views.of(self._physics, name),
-            rotations,
-            lambda: self._task.objects[name].asset,
-        )
+        sensed = self._known[name]
+        views = self._views.of(self._physics, name) or self._more_views.of(self._physics, name)
+
+        @cache
+        def sample() -> GraspSet:
+            return sensed_grasps(
+                self._grasp_source, sensed, views, rotations, lambda: self._task.objects[name].asset
+            )
+
+        return sample
 
     def _with_mesh(self, name: str, views: tuple[ObjectView, ...]) -> tuple[ObjectView, ...]:
         """The views as estimators get them: with the object's mesh, if they are given it."""
@@ -332,7 +336,7 @@ class EstimatedPerception:
             name=name,
             pose=sensed.pose,
             label=sensed.shape.label,
-            grasps=self._grasps[name],
+            sample_grasps=self._grasps[name],
             body=body,
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,

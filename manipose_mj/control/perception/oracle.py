@@ -76,7 +76,7 @@ class OraclePerception:
             name=name,
             pose=entity.object_pose(self._physics),
             label=entity.asset.label,
-            grasps=entity.asset.grasps or none,
+            sample_grasps=lambda: entity.asset.grasps or none,
             body=body,
             geoms=subtree_geoms(self._model.model, body),
             rests=entity.asset.stable_poses,

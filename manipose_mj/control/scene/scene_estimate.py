@@ -6,6 +6,7 @@ knows the difference.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ class ObjectEstimate:
       name: What plans call it.
       pose: `T_world_object`.
       label: Its pose label, in the object frame.
-      grasps: In the object frame.
+      sample_grasps: Gives `grasps`, the same ones each time; called when somebody needs them.
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
       rests: Stable poses, in the order of `grasps.clear`; none where they are not known.
@@ -40,13 +41,18 @@ class ObjectEstimate:
     name: str
     pose: Float[np.ndarray, "4 4"]
     label: PoseLabel
-    grasps: GraspSet
+    sample_grasps: Callable[[], GraspSet]
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     rests: tuple[StablePose, ...] = ()
     category: str = ""
     uncertainty: float = 0.0
     guessed_frame: bool = False
+
+    @property
+    def grasps(self) -> GraspSet:
+        """In the object frame."""
+        return self.sample_grasps()
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:

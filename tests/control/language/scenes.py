@@ -38,7 +38,7 @@ def rigid(
         np.tile(np.eye(4), (count, 1, 1)), np.full(count, 0.05), np.ones((count, 1), bool)
     )
     pose = compose(rotation, np.array(place))
-    return ObjectEstimate(name, pose, label, grasps, 1, NO_GEOMS, category=category)
+    return ObjectEstimate(name, pose, label, lambda: grasps, 1, NO_GEOMS, category=category)
 
 
 def drawer(name: str, height: float, opening: float = 0.0) -> PartEstimate:

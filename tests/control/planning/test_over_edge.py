@@ -32,11 +32,12 @@ def plate() -> Asset:
 
 
 def _lying(asset: Asset, stable: int) -> ObjectEstimate:
-    assert asset.grasps is not None
+    grasps = asset.grasps
+    assert grasps is not None
     pose = pose_on_table(asset, stable, PLACE, 0.3)
     geoms = np.zeros(1, bool)
     return ObjectEstimate(
-        "object", pose, asset.label, asset.grasps, 1, geoms, rests=asset.stable_poses
+        "object", pose, asset.label, lambda: grasps, 1, geoms, rests=asset.stable_poses
     )
 
 

@@ -33,7 +33,7 @@ NO_SCENE = Mock(spec=PlanningScene)  # without a motion planner nothing looks at
 def _object(extents=(0.25, 0.075, 0.075)) -> ObjectEstimate:
     label = PoseLabel(np.zeros(3), np.eye(3), "axial", np.array(extents), SymmetryGroup.about_x())
     grasps = GraspSet(np.empty((0, 4, 4)), np.empty(0), np.empty((0, 1), bool))
-    return ObjectEstimate("object", POSE, label, grasps, 1, NO_GEOMS)
+    return ObjectEstimate("object", POSE, label, lambda: grasps, 1, NO_GEOMS)
 
 
 def _drawer(opening: float = 0.0) -> PartEstimate:
