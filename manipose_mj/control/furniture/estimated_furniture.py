@@ -224,7 +224,7 @@ class EstimatedFurniture:
             self._held = _Held(part.name, start, np.zeros(3))
 
     def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
-        """Find out how far parts are open now."""
+        """Find out how far parts are open now, through the cameras that see their fronts: images take time."""
         model = self.model
         if model is None:
             return
@@ -237,7 +237,7 @@ class EstimatedFurniture:
             return
         suspected = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
         if suspected:
-            points, hidden = self._points(), self._hidden()
+            points, hidden = self._seen_in_front()
             tree = cKDTree(points)
             for part in suspected:
                 before = self._before.pop(part.name, None)
@@ -371,15 +371,13 @@ class EstimatedFurniture:
     def _cloud(self, cameras: tuple[str, ...] | None = None) -> SceneCloud:
         return self._views.cloud(self._physics, self._mask, cameras=cameras)
 
-    def _hidden(self) -> Hidden:
-        """Which points, object frame [m], no camera can see now."""
+    def _seen_in_front(self) -> tuple[Float[np.ndarray, "n 3"], Hidden]:
+        """Points of the furniture now, object frame [m]; and which points there no front camera can see."""
         assert self.model is not None
-        return hidden_from(self._views.sights(self._physics), self.model.pose)
-
-    def _points(self) -> Float[np.ndarray, "n 3"]:
-        assert self.model is not None
-        cloud = self._views.cloud(self._physics, self._mask, normals=False)
-        return transform(invert(self.model.pose), cloud.points)
+        cameras, pose = self._front_cameras, self.model.pose
+        cloud = self._views.cloud(self._physics, self._mask, cameras=cameras, normals=False)
+        hidden = hidden_from(self._views.sights(self._physics, cameras), pose)
+        return transform(invert(pose), cloud.points), hidden
 
 
 def _inside(

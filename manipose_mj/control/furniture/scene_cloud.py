@@ -139,10 +139,12 @@ class SceneViews:
         found = np.concatenate(points)
         return SceneCloud(found, np.concatenate(directions), np.full(len(found), instance))
 
-    def sights(self, physics: mjcf.Physics) -> tuple[Sight, ...]:
-        """How far every camera sees."""
+    def sights(
+        self, physics: mjcf.Physics, cameras: Sequence[str] | None = None
+    ) -> tuple[Sight, ...]:
+        """How far these cameras see; all by default."""
         found = []
-        for camera in self.cameras:
+        for camera in self.cameras if cameras is None else cameras:
             depth = self._read(physics, f"depth/{camera}")
             k = _intrinsics(self._read(physics, f"camera/{camera}/intrinsics"), depth.shape)
             found.append(Sight(depth, k, self.camera_pose(physics, camera)))

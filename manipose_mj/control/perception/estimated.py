@@ -29,6 +29,7 @@ from manipose_mj.control.perception.pose_sensing import (
     Estimator,
     SensedPose,
     sense_pose,
+    weighed,
 )
 from manipose_mj.control.perception.source_names import TOLD_OF_KINDS, GraspSource
 from manipose_mj.control.perception.worlds import SimulatedWorld, World
@@ -66,7 +67,7 @@ _TRUSTED = (
 )
 _AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
-_BETTER = 0.9  # of the misfit that is left, for another pose to replace it
+_BETTER = 0.9  # of what is left of misfit and doubt, for another pose to replace it
 # How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
 # they lose it: [m], and as a share of its width.
 _IN_HAND = (0.03, 0.5)
@@ -272,7 +273,9 @@ class EstimatedPerception:
         if misfit <= factor * before.misfit + more and before.confidence >= _SURE:
             return before
         sensed = self._sensed(name, views, OneShape(before.shape))
-        if sensed is None or sensed.misfit > _BETTER * misfit:
+        if sensed is None:
+            return before
+        if weighed(sensed.misfit, sensed.confidence) > _BETTER * weighed(misfit, before.confidence):
             return before
         if held and not self._may_be_lost() and not _nearly(sensed, before):
             return before

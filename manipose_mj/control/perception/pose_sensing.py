@@ -78,7 +78,7 @@ def sense_pose(
         for hypothesis in _different([estimate, *estimate.hypotheses]):
             pose = view.T_world_camera @ hypothesis.pose.astype(float)
             found = shapes.fit(hypothesis, pose, views)
-            score = found.contradiction * (1 + _DISTRUST * (1 - hypothesis.confidence))
+            score = weighed(found.contradiction, hypothesis.confidence)
             if score < least:
                 least, best = score, (pose, found, hypothesis.confidence, view.camera)
     if best is None:
@@ -87,6 +87,11 @@ def sense_pose(
     shape = found.shape()
     misfit = shape.misfit(transform(invert(pose), points))
     return SensedPose(pose, shape, misfit, confidence, camera)
+
+
+def weighed(misfit: float, confidence: float) -> float:
+    """How badly a pose fits [m], by its misfit [m] and by how far the estimator trusts it; less is better."""
+    return misfit * (1 + _DISTRUST * (1 - confidence))
 
 
 def _different(hypotheses: Sequence[PoseEstimate]) -> list[PoseEstimate]:
