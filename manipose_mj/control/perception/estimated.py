@@ -142,7 +142,7 @@ class EstimatedPerception:
         """Estimate every object of an episode, and build a scene of what is seen.
 
         Raises:
-          StageFailure: An object that a goal is about is not seen.
+          StageFailure: An object that a goal is about is not seen, nor is anything that may hide it.
           InputError: There are no weights for a category or its type.
         """
         self._keys = _keys(seed)
@@ -151,9 +151,8 @@ class EstimatedPerception:
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
         self._find_objects()
-        hidden = {goal.object for goal in self._task.goals if isinstance(goal, TakenOutGoal)}
-        for name in self._needed - self._known.keys() - hidden:
-            raise StageFailure("perception", f"no camera sees enough of {name}")
+        if self._covered and not self._known:
+            raise StageFailure("perception", f"no camera sees enough of {min(self._covered)}")
         self._time = float(self._physics.data.time)
         self._build()
 
@@ -166,6 +165,19 @@ class EstimatedPerception:
     def unseen(self) -> frozenset[str]:
         """Objects of goals that no camera has seen yet."""
         return frozenset(self._needed - self._known.keys())
+
+    @property
+    def _covered(self) -> frozenset[str]:
+        """Those of them that no furniture hides."""
+        goals = self._task.goals
+        return self.unseen - {goal.object for goal in goals if isinstance(goal, TakenOutGoal)}
+
+    def look_for_covered(self) -> None:
+        """After an object was moved: look for those of goals that it may have hidden."""
+        if self._covered:
+            self.observe()
+            self._find_objects()
+            self._build()
 
     def look_again(self) -> None:
         """After something was opened: measure it, and look for what it hid.
@@ -309,11 +321,12 @@ class EstimatedPerception:
     def _grasps_of(self, name: str) -> Callable[[], GraspSet]:
         """Samples grasps of what is seen now, for the pose estimated and those that goals ask for; once, when asked to."""
         symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
-        frames = [goal.goal_frame(symmetries) for goal in self._task.goals]
+        goals = [goal for goal in self._task.goals if getattr(goal, "object", None) == name]
+        frames = [goal.goal_frame(symmetries) for goal in goals]
         rotations = [
             np.asarray(frame.pose)[:3, :3]
             for frame in frames
-            if frame is not None and frame.object == name and frame.rotation_counts
+            if frame is not None and frame.rotation_counts
         ]
         sensed = self._known[name]
         views = self._views.of(self._physics, name) or self._more_views.of(self._physics, name)

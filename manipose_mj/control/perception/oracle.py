@@ -64,6 +64,9 @@ class OraclePerception:
     def pushed(self, name: str, opening: float) -> None:
         """Nothing to learn."""
 
+    def look_for_covered(self) -> None:
+        """Nothing is hidden."""
+
     def look_again(self) -> None:
         """Nothing is hidden."""
 

@@ -62,6 +62,10 @@ class Perception(Protocol):
         """The hand pushed a part to about this opening [m or rad]."""
         ...
 
+    def look_for_covered(self) -> None:
+        """After an object was moved: look for those of goals that it may have hidden."""
+        ...
+
     def look_again(self) -> None:
         """Look at what was opened, and into it; plans made before no longer count."""
         ...

@@ -41,7 +41,8 @@ _CONTACT_ALLOWANCES = (0.001, 0.006, 0.012)
 def in_clutter(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
     """Whether the goals are about objects among others."""
     only_poses = all(isinstance(goal, PoseGoal | OnTableGoal) for goal in goals)
-    return only_poses and len(estimate.objects) > 1 and not estimate.parts
+    names = estimate.objects.keys() | {goal.object for goal in goals if isinstance(goal, PoseGoal)}
+    return only_poses and len(names) > 1 and not estimate.parts
 
 
 def candidate_moves(
@@ -50,23 +51,25 @@ def candidate_moves(
     """Next moves, the most promising first; a single one without steps when every pose is reached.
 
     First what brings a target to its goal, or starts the shortest order that lets one be brought there, past
-    neighbours that may give way ever more; then such orders with pushes among them; then anything near, which at
-    last is pushed.
+    neighbours that may give way ever more; then such orders with pushes among them; then what may hide a target that
+    is not seen; then anything near, which at last is pushed.
 
     Args:
       goals: All of them.
-      estimate: What is where.
+      estimate: What is where; targets may be missing.
       planner: Of motions in the scene of `estimate`.
 
     Raises:
       InputError: There are no more moves.
     """
     pose_goals = [goal for goal in goals if isinstance(goal, PoseGoal)]
-    unmet = [goal for goal in pose_goals if not _met(goal, estimate.objects[goal.object])]
-    if not unmet:
+    seen = [goal for goal in pose_goals if goal.object in estimate.objects]
+    hidden = [goal.object for goal in pose_goals if goal not in seen]
+    unmet = [goal for goal in seen if not _met(goal, estimate.objects[goal.object])]
+    if not unmet and not hidden:
         yield CandidatePlan(tuple)
         return
-    done = {goal.object for goal in pose_goals} - {goal.object for goal in unmet}
+    done = {goal.object for goal in seen} - {goal.object for goal in unmet}
     in_place = {goal.object: _in_place(goal, estimate, planner) for goal in unmet}
     ready = {goal.object: goal for goal in unmet if not in_place[goal.object]}
 
@@ -103,11 +106,17 @@ def candidate_moves(
         if plan := pushed(name):
             yield CandidatePlan(lambda plan=plan: plan, _CONTACT_ALLOWANCES[-1])
     nearby = _near(unmet, in_place, estimate, planner)
+    if hidden:
+        nearby = list(dict.fromkeys([*_covers(estimate, planner), *nearby]))
     for attempt in attempts:
         yield from filter(None, (taken(name, attempt) for name in nearby))
     for name in nearby:
         if plan := pushed(name):
             yield CandidatePlan(lambda plan=plan: plan, _CONTACT_ALLOWANCES[-1])
+    if not unmet:
+        raise InputError(
+            f"no camera sees {hidden[0]}, and nothing can be moved any more that hides it"
+        )
     raise InputError(f"nothing can be moved any more towards {unmet[0].object}'s goal")
 
 
@@ -166,6 +175,34 @@ def _near(
     return [*(n for n in dict.fromkeys((*names, *high)) if n not in targets), *targets]
 
 
+def _covers(estimate: SceneEstimate, planner: MotionPlanner) -> list[str]:
+    """What may hide something: of the largest crowd first, what nothing lies on before the rest, and what hides most."""
+    left, crowds = dict(estimate.objects), []
+    while left:
+        crowd = [left.pop(next(iter(left)))]
+        for obj in crowd:
+            near = [name for name, other in left.items() if _gap(obj, other) < _CROWDED]
+            crowd += [left.pop(name) for name in near]
+        crowds.append(crowd)
+    ranked = sorted(
+        (
+            -len(crowd),
+            _lies_under_others(estimate, obj, planner),
+            -_space_under(obj, estimate),
+            obj.name,
+        )
+        for crowd in crowds
+        for obj in crowd
+    )
+    return [name for *_, name in ranked]
+
+
+def _space_under(obj: ObjectEstimate, estimate: SceneEstimate) -> float:
+    """From the table to the top of the box around an object, itself included [m^3]."""
+    middle, half = obj.box_around(estimate.scene, obj.label_pose[:3, :3])
+    return float(4 * half[0] * half[1] * (obj.label_pose[2, 3] + middle[2] + half[2]))
+
+
 def _crowd(
     unmet: list[PoseGoal], estimate: SceneEstimate, planner: MotionPlanner
 ) -> list[ObjectEstimate]:
@@ -186,8 +223,7 @@ def _nearby(unmet: list[PoseGoal], estimate: SceneEstimate) -> list[ObjectEstima
     for goal in unmet:
         obj = estimate.objects[goal.object]
         for name, other in estimate.objects.items():
-            gap = _distance(obj, other) - radius(obj) - radius(other)
-            gaps[name] = min(gap, gaps.get(name, np.inf))
+            gaps[name] = min(_gap(obj, other), gaps.get(name, np.inf))
     return [estimate.objects[n] for n in sorted(gaps, key=lambda n: gaps[n]) if gaps[n] < _CROWDED]
 
 
@@ -218,5 +254,7 @@ def _in_place(goal: PoseGoal, estimate: SceneEstimate, planner: MotionPlanner) -
     )
 
 
-def _distance(one: ObjectEstimate, other: ObjectEstimate) -> float:
-    return float(np.linalg.norm(one.label_pose[:3, 3] - other.label_pose[:3, 3]))
+def _gap(one: ObjectEstimate, other: ObjectEstimate) -> float:
+    """Between the circles about two objects [m]."""
+    distance = np.linalg.norm(one.label_pose[:3, 3] - other.label_pose[:3, 3])
+    return float(distance) - radius(one) - radius(other)

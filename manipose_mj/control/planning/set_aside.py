@@ -39,6 +39,7 @@ _NEAREST, _FARTHEST, _WIDEST = 0.30, 0.72, 0.55
 _MAX_PUSHES = 8
 _MIN_CLEAR = 3  # grasps of a stable pose that make it worth setting something down in
 _QUARTER = np.pi / 2
+_UNSEEN = 0.08  # radius of what nobody has seen [m]
 
 
 def places_aside(
@@ -62,7 +63,7 @@ def places_aside(
     """
     others = [other for other in estimate.objects.values() if other.name != obj.name]
     taken = [(other.label_pose[:2, 3], radius(other)) for other in others]
-    wanted = [(goal.pose[:2, 3], radius(estimate.objects[goal.object])) for goal in goals]
+    wanted = _wanted(goals, estimate)
     own = obj.label_pose[:2, 3]
     order = sorted(_PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
     rotations = _rest_rotations(obj, _MAX_RESTS * (attempt + 1))
@@ -96,7 +97,7 @@ def places_pushed(
     """
     others = [other for other in estimate.objects.values() if other.name != obj.name]
     taken = [(other.label_pose[:2, 3], radius(other)) for other in others]
-    wanted = [(goal.pose[:2, 3], radius(estimate.objects[goal.object])) for goal in goals]
+    wanted = _wanted(goals, estimate)
     found = []
     for distance in _PUSHES:
         for angle in np.linspace(-np.pi, np.pi, _DIRECTIONS, endpoint=False):
@@ -116,6 +117,17 @@ def places_pushed(
 def radius(obj: ObjectEstimate) -> float:
     """Of a circle about the label's origin that the object stays in, however it lies [m]."""
     return float(np.linalg.norm(np.sort(obj.label.extents)[1:])) / 2
+
+
+def _wanted(
+    goals: Sequence[PoseGoal], estimate: SceneEstimate
+) -> list[tuple[Float[np.ndarray, "2"], float]]:
+    """Circles that objects will fill at their goals; of one that nobody has seen its size is guessed."""
+    objects = estimate.objects
+    return [
+        (goal.pose[:2, 3], radius(objects[goal.object]) if goal.object in objects else _UNSEEN)
+        for goal in goals
+    ]
 
 
 def _gap(xy: tuple[float, float], circles: list[tuple[Float[np.ndarray, "2"], float]]) -> float:
