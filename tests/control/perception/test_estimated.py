@@ -152,6 +152,20 @@ def test_an_estimate_is_kept_while_it_fits_and_re_estimated_when_it_does_not(cup
     np.testing.assert_allclose(now, moved, atol=1e-9)
 
 
+@pytest.mark.parametrize(("sure", "replaced"), [(0.9, True), (0.1, False)])
+def test_a_doubted_estimate_gives_way_to_a_surer_one_that_fits_as_well(cup, truth, sure, replaced):
+    pose, extents = truth
+    estimator = Recalled(pose, extents, confidence=0.1)
+    perception = _perception(cup, estimator)
+    perception.reset(0)
+    nearby = np.array(pose)
+    nearby[:3, 3] += [0.0, 0.0, 0.0005]
+    estimator.pose_world, estimator.confidence = nearby, sure
+    cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
+    now = perception.observe().objects["object"].label_pose
+    np.testing.assert_allclose(now, nearby if replaced else pose, atol=1e-9)
+
+
 def test_what_is_held_follows_the_hand(cup, truth):
     perception = _perception(cup, Recalled(*truth))
     perception.reset(0)
