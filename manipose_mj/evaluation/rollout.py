@@ -114,8 +114,10 @@ class Rollout:
         observation = self._observe(step.observation)
         start = time.perf_counter()
         try:
-            answer = self._policy.infer(observation)
-            outcome.policy_s += time.perf_counter() - start
+            try:
+                answer = self._policy.infer(observation)
+            finally:  # a policy that gives up has taken its time as well
+                outcome.policy_s += time.perf_counter() - start
             outcome.decisions += 1
             width = answered_width(answer)
             if outcome.decisions == 1 and width is not None and width != size:

@@ -62,6 +62,12 @@ def run(settings: PolicySettings, seed: int = 1, **options: Any):
     return run_policy_episode(env_config(**options), EpisodeSpec(seed), settings=settings)[0]
 
 
+def test_the_time_of_a_policy_that_gives_up_counts():
+    result = run(PolicySettings(f"{HERE}:LongGivingUp"))
+    assert (result.failure, result.decisions) == ("plan", 0)
+    assert 0.2 < result.policy_s < result.wall_s
+
+
 @pytest.mark.parametrize(
     ("hz", "execute", "decisions", "steps"),
     [(10.0, None, 5, 5 * 4 * 5), (50.0, None, 5, 5 * 4), (10.0, 1, 5, 5 * 5), (15.0, 3, 5, 50)],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,14 @@ class GivingUp(Raising):
 
     def infer(self, obs: Any) -> Any:
         raise StageFailure("plan", "no way")
+
+
+class LongGivingUp(GivingUp):
+    """A policy that says so after it has thought for a while."""
+
+    def infer(self, obs: Any) -> Any:
+        time.sleep(0.2)
+        return super().infer(obs)
 
 
 class Dying(Reaching):
