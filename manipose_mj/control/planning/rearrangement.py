@@ -64,7 +64,7 @@ def candidate_moves(
     """
     pose_goals = [goal for goal in goals if isinstance(goal, PoseGoal)]
     seen = [goal for goal in pose_goals if goal.object in estimate.objects]
-    hidden = [goal.object for goal in pose_goals if goal not in seen]
+    hidden = [goal.object for goal in pose_goals if goal.object not in estimate.objects]
     unmet = [goal for goal in seen if not _met(goal, estimate.objects[goal.object])]
     if not unmet and not hidden:
         yield CandidatePlan(tuple)
