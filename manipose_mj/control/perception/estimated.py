@@ -39,7 +39,7 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstima
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, pose_error, transform
 from manipose_mj.tasks.core.task import ManipulationTask
-from manipose_mj.tasks.goals import TakenOutGoal
+from manipose_mj.tasks.goals import OnTableGoal, PoseGoal, TakenOutGoal
 from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
 
 # What an estimating agent looks through: a depth camera's noise, at a third of its usual pixels.
@@ -67,7 +67,7 @@ _TRUSTED = (
 )
 _AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
-_BETTER = 0.9  # of what is left of misfit and doubt, for another pose to replace it
+_BETTER = 0.9  # of what is left of the weighed misfit, for another pose to replace it
 # How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
 # they lose it: [m], and as a share of its width.
 _IN_HAND = (0.03, 0.5)
@@ -151,7 +151,7 @@ class EstimatedPerception:
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
         self._find_objects()
-        if self._covered and not self._known:
+        if self._covered and not (self._known and self._among_others):
             raise StageFailure("perception", f"no camera sees enough of {min(self._covered)}")
         self._time = float(self._physics.data.time)
         self._build()
@@ -171,6 +171,12 @@ class EstimatedPerception:
         """Those of them that no furniture hides."""
         goals = self._task.goals
         return self.unseen - {goal.object for goal in goals if isinstance(goal, TakenOutGoal)}
+
+    @property
+    def _among_others(self) -> bool:
+        """Whether the goals are about objects among others alone: these can be moved off what they hide."""
+        only_poses = all(isinstance(goal, PoseGoal | OnTableGoal) for goal in self._task.goals)
+        return only_poses and not self._task.furniture_masks
 
     def look_for_covered(self) -> None:
         """After an object was moved: look for those of goals that it may have hidden."""

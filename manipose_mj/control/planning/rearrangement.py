@@ -255,6 +255,6 @@ def _in_place(goal: PoseGoal, estimate: SceneEstimate, planner: MotionPlanner) -
 
 
 def _gap(one: ObjectEstimate, other: ObjectEstimate) -> float:
-    """Between the circles about two objects [m]."""
+    """Between the spheres about two objects [m]."""
     distance = np.linalg.norm(one.label_pose[:3, 3] - other.label_pose[:3, 3])
     return float(distance) - radius(one) - radius(other)

@@ -17,6 +17,7 @@ from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
 from manipose_mj.failures import StageFailure
 from manipose_mj.ppf_jax.estimator import PoseEstimate
+from manipose_mj.tasks.goals import OrientationGoal
 from tests.few_objects import load
 
 
@@ -69,5 +70,13 @@ def test_what_hides_a_target_goes_first_and_the_target_is_found_then(pile):
 def test_where_nothing_is_seen_nothing_can_hide_a_target(pile):
     task, perception, covered = pile
     covered.update(task.objects)
+    with pytest.raises(StageFailure, match="no camera sees enough of object"):
+        perception.reset(0)
+
+
+def test_only_in_clutter_is_anything_moved_off_a_target(pile, monkeypatch):
+    task, perception, _ = pile
+    goals = (OrientationGoal("object", np.eye(3)),)
+    monkeypatch.setattr(type(task), "goals", property(lambda self: goals))
     with pytest.raises(StageFailure, match="no camera sees enough of object"):
         perception.reset(0)

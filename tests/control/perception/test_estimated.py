@@ -153,7 +153,9 @@ def test_an_estimate_is_kept_while_it_fits_and_re_estimated_when_it_does_not(cup
 
 
 @pytest.mark.parametrize(("sure", "replaced"), [(0.9, True), (0.1, False)])
-def test_a_doubted_estimate_gives_way_to_a_surer_one_that_fits_as_well(cup, truth, sure, replaced):
+def test_an_uncertain_estimate_gives_way_to_a_surer_one_that_fits_as_well(
+    cup, truth, sure, replaced
+):
     pose, extents = truth
     estimator = Recalled(pose, extents, confidence=0.1)
     perception = _perception(cup, estimator)
