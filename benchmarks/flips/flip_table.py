@@ -1,13 +1,14 @@
 """How often estimates are flipped, with one view and with several scored together, and whether confidence is right.
 
     python benchmarks/flips/scan_views.py ycb PATH --out VIEWS/ycb
-    python benchmarks/flips/flip_table.py VIEWS/ycb [VIEWS/gso ...] [--views 1 2 3] [--scans] [--records FILE]
+    python benchmarks/flips/flip_table.py VIEWS/ycb [VIEWS/gso ...] [--views 1 2 3] [--scans] [--records FILE] [--fused]
 
 Views of a scan are taken three by three: with two cameras, the first two of each three are scored together, their poses
 to one another known. A scan is estimated by the network of its category where that knows its symmetry, else by that of
 its type; where the catalogue's objects are round and the scan is not, by the category's, and only its axis counts. An
 estimate is right within 15 deg, flipped beyond 90. `--records` is what `fit_confidence.py` reads. Reliability is of
-estimates with the pose scorer's own probability, and with the calibrated one.
+estimates with the pose scorer's own probability, and with the calibrated one. `--fused` asks the networks that look
+through several cameras about the views as one cloud.
 """
 
 from __future__ import annotations
@@ -23,15 +24,17 @@ import jax
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scan_views import ScanViews, read_views
 
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, invert, pose_error
-from manipose_mj.ppf_jax.confidence import shipped_calibration
+from manipose_mj.ppf_jax.confidence import Calibration, shipped_calibration
 from manipose_mj.ppf_jax.estimator import PoseEstimator, view_scores
+from manipose_mj.ppf_jax.fused_views import FusedViewEstimator, fused_cloud
 from manipose_mj.ppf_jax.multi_view import score_together
+from manipose_mj.ppf_jax.points.cloud_files import ScanViews, read_views
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.weight_files import Cameras
 
 GROUP = 3  # consecutive views that are scored together
 RIGHT, FLIPPED = np.deg2rad(15.0), np.pi / 2
@@ -62,7 +65,7 @@ class Record:
         return self.turn <= RIGHT and self.shift <= RIGHT_ORIGIN
 
 
-def network_of(scan: ScanViews) -> tuple[PoseEstimator, SymmetryGroup]:
+def network_of(scan: ScanViews, cameras: Cameras = "one") -> tuple[PoseEstimator, SymmetryGroup]:
     """The estimator of a scan, and the turns that do not count.
 
     Raises:
@@ -70,20 +73,27 @@ def network_of(scan: ScanViews) -> tuple[PoseEstimator, SymmetryGroup]:
     """
     row, group = CATALOGUE.get(scan.category), scan.symmetry
     if row is not None and row.object_type == "axial" and not group.axial:
-        return PoseEstimator.load(scan.category), SymmetryGroup.about_x()
+        return PoseEstimator.load(scan.category, cameras=cameras), SymmetryGroup.about_x()
     if scan.in_catalogue and row is not None and row.symmetry == "axis" and not group.axial:
         group = SymmetryGroup.about_x()
     names = [scan.category] if scan.in_catalogue else []
     for name in (*names, scan.object_type):
-        estimator = PoseEstimator.load(name)
+        estimator = PoseEstimator.load(name, cameras=cameras)
         if estimator.trained.model.config.symmetry.holds(group):
             return estimator, group
     raise InputError(f"{scan.name}: no network knows its symmetry")
 
 
-def records_of(scan: ScanViews, counts: Sequence[int]) -> Iterator[Record]:
+def calibration_of(estimator: PoseEstimator) -> Calibration:
+    """That of its weights, which ship."""
+    return estimator.calibration or shipped_calibration()
+
+
+def records_of(
+    scan: ScanViews, counts: Sequence[int], cameras: Cameras = "one"
+) -> Iterator[Record]:
     """Every estimate of a scan."""
-    estimator, group = network_of(scan)
+    estimator, group = network_of(scan, cameras)
     for count in counts:
         step = 1 if count == 1 else GROUP
         for start in range(0, len(scan.clouds) - count + 1, step):
@@ -99,7 +109,12 @@ def _record(
 ) -> Record:
     key = jax.random.fold_in(jax.random.key(0), seed)
     truths = [view.pose.astype(float) for view in views]
-    if len(views) == 1:
+    if estimator.trained.cameras == "several":
+        frames = np.stack([truths[0] @ invert(truth) for truth in truths])
+        cloud, T_first_cloud = fused_cloud(views, frames, rng=np.random.default_rng(seed))
+        pose, scores = FusedViewEstimator(estimator).scores(cloud, key=key)
+        pose = T_first_cloud @ pose.astype(float)
+    elif len(views) == 1:
         pose, scores = view_scores(estimator, views[0], key=key)
     else:
         frames = np.stack([truths[0] @ invert(truth) for truth in truths])
@@ -113,7 +128,7 @@ def _record(
         float(turn),
         float(shift),
         scores.score,
-        shipped_calibration().probability(scores),
+        calibration_of(estimator).probability(scores),
         tuple(scores.features().tolist()),
     )
 
@@ -183,6 +198,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="of views")
     parser.add_argument("--views", nargs="+", type=int, default=[1, 2, 3], metavar="N")
     parser.add_argument("--scans", action="store_true", help="print each scan with flips as well")
+    parser.add_argument("--fused", action="store_true", help="views as one cloud")
     parser.add_argument("--records", type=Path, metavar="FILE", help="to write all estimates to")
     options = parser.parse_args(argv)
     try:
@@ -192,7 +208,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         for folder in options.folders:
             for scan in read_views(folder):
                 try:
-                    records += records_of(scan, options.views)
+                    cameras = "several" if options.fused else "one"
+                    records += records_of(scan, options.views, cameras)
                 except InputError as error:
                     print(f"left out: {error}", file=sys.stderr)
     except InputError as error:

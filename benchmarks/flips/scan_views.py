@@ -18,7 +18,6 @@ import logging
 import sys
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,60 +27,16 @@ from asset_pipeline.labelling.scan_label import scan_label
 from asset_pipeline.sources import google_scanned_objects, ycb
 from asset_pipeline.sources.scan import ScanItem
 from manipose_mj.assets.categories import CATALOGUE
-from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.data.rendering import Subject, render_clouds
 from manipose_mj.ppf_jax.data.view_cache import catalogue_subject
 from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
-from manipose_mj.ppf_jax.points.cloud_files import read_clouds, write_clouds
-from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.cloud_files import INDEX, ScanViews, write_clouds
 
 log = logging.getLogger("scan_views")
 SOURCES = {"google_scanned_objects": google_scanned_objects, "ycb": ycb}
 OWN, OBJECTS = "catalogue", 3  # of each category
-INDEX = "scans.json"
 Split = tuple[int, int]  # leave out every so manyth; only every so manyth; 0 for neither
-
-
-@dataclass(frozen=True)
-class ScanViews:
-    """The views of one scan.
-
-    Attributes: name; category; object_type, the label's rule; clouds, whose poses are of the same label frame.
-    """
-
-    name: str
-    category: str
-    object_type: ObjectType
-    clouds: tuple[LabelledCloud, ...]
-
-    @property
-    def symmetry(self) -> SymmetryGroup:
-        """Of the shape."""
-        return self.clouds[0].symmetry
-
-    @property
-    def in_catalogue(self) -> bool:
-        """Whether training had the kind."""
-        row = CATALOGUE.get(self.category)
-        return row is not None and row.object_type == self.object_type
-
-
-def read_views(folder: Path) -> list[ScanViews]:
-    """All scans that were rendered into a folder.
-
-    Raises:
-      InputError: There are none.
-    """
-    try:
-        index = json.loads((folder / INDEX).read_text())
-    except (OSError, ValueError):
-        raise InputError(f"{folder}: no views of scans; render some with scan_views.py") from None
-    return [
-        ScanViews(name, *kind, tuple(read_clouds(folder / f"{name}.npz", name, kind[0])))
-        for name, kind in sorted(index.items())
-    ]
 
 
 def render_scan(

@@ -29,7 +29,7 @@ from manipose_mj.ppf_jax.data.view_settings import ViewSetting, task_intrinsics
 from manipose_mj.ppf_jax.data.view_stream import (
     SeenObject,
     catalogue_views,
-    check_untapered,
+    check_single_views,
     split_indices,
 )
 from manipose_mj.storage.staging import clear_staging, put_in_place, staging
@@ -65,7 +65,7 @@ def export(
     Raises:
       InputError: The folder exists or cannot be written, or the setting draws objects other than they are.
     """
-    check_untapered(setting)
+    check_single_views(setting)
     if folder.exists():
         raise InputError(f"{folder}: exists; choose another --out")
     chosen = [(name, index) for name in categories for index in split_indices(name, split)]

@@ -169,7 +169,7 @@ class Baseline:
         while True:
             try:
                 if candidates is None:
-                    scene.perception.look_for_covered()
+                    scene.perception.look_around()
                     estimate = executor.observe()
                     arm = scene.perception.arm
                     planner = MotionPlanner(estimate.scene, arm, timestep, rng, allowance)

@@ -37,11 +37,18 @@ from manipose_mj.ppf_jax.rigid.model import (
     estimate_batch,
     estimate_sample,
 )
-from manipose_mj.ppf_jax.weight_files import LabelSet, MethodName, TrainedModel, load_weights
+from manipose_mj.ppf_jax.weight_files import (
+    Cameras,
+    LabelSet,
+    MethodName,
+    TrainedModel,
+    load_weights,
+)
 
+SEVERAL = "several"  # folder of the weights of networks that look through several cameras
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
-_LONGEST, _SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
+LONGEST, SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
 
 
 @dataclass(frozen=True)
@@ -57,13 +64,14 @@ class PoseEstimator:
     calibration: Calibration | None = None
 
     @classmethod
-    def load(cls, name: str) -> PoseEstimator:
+    def load(cls, name: str, *, cameras: Cameras = "one") -> PoseEstimator:
         """The estimator of a category or of an object type, from the weights shipped with the package.
 
         A category without weights of its own gets its type's. Files are read once.
 
         Args:
           name: Such as `"mug"` or `"axial"`.
+          cameras: How many see a cloud; for clouds of several see `FusedViewEstimator`.
 
         Raises:
           InputError: No such category or type; or there are no weights for it.
@@ -72,10 +80,14 @@ class PoseEstimator:
             raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
         stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
         folder = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
+        calibration = calibration_in(folder)
+        if cameras == "several":
+            folder /= SEVERAL
+            calibration = calibration_in(folder) or calibration
         keep_compiled()
         for stem in stems:
             if (folder / f"{stem}.npz").is_file():
-                return cls(_read_once(folder / f"{stem}.npz"), calibration_in(folder))
+                return cls(_read_once(folder / f"{stem}.npz"), calibration)
         raise InputError(
             f"no weights for {name} in {folder}; train some with `manipose pose train {name}` "
             "and read them with PoseEstimator.from_file"
@@ -123,9 +135,9 @@ class PoseEstimator:
             points, normals = _checked(cloud, key)
             normals = cloud_normals(points) if normals is None else normals
             found = _estimate(model, *_padded(points, normals, bucket(len(points))), key=key)
-            return self._as_estimate(found)
+            return self.as_estimate(found)
         sample = prepared_sample(model, cloud, key=key)
-        return self._as_estimate(_estimate_sample(model, *sample, key=key))
+        return self.as_estimate(_estimate_sample(model, *sample, key=key))
 
     def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
@@ -148,9 +160,10 @@ class PoseEstimator:
         rows = [_padded(points, normals, size) for points, normals in checked]
         columns = (jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True))
         found = jax.tree.map(np.asarray, estimate_batch(self.trained.model, *columns, key=key))
-        return [self._as_estimate(_row(found, i)) for i in range(len(rows))]
+        return [self.as_estimate(_row(found, i)) for i in range(len(rows))]
 
-    def _as_estimate(self, found: Estimates) -> PoseEstimate:
+    def as_estimate(self, found: Estimates) -> PoseEstimate:
+        """What the networks found, with a calibrated confidence, hypotheses that are alike last."""
         poses, extents, confidence = (
             np.asarray(leaf) for leaf in (found.poses, found.extents, found.confidence)
         )
@@ -177,11 +190,20 @@ def view_scores(
     model = estimator.trained.model
     if not isinstance(model, PoseModel):
         raise InputError("only our networks score poses")
-    found = _estimate_sample(model, *prepared_sample(model, cloud, key=key), key=key)
+    return scores_found(
+        estimator, _estimate_sample(model, *prepared_sample(model, cloud, key=key), key=key)
+    )
+
+
+def scores_found(
+    estimator: PoseEstimator, found: Estimates
+) -> tuple[Float[np.ndarray, "4 4"], Scores]:
+    """The likeliest pose, and what its confidence is made of."""
     poses, confidence, error = (
         np.asarray(leaf) for leaf in (found.poses, found.confidence, found.expected_error)
     )
-    return poses[0], scores_of(poses, confidence, error, model.config.symmetry)
+    symmetry = estimator.trained.model.config.symmetry
+    return poses[0], scores_of(poses, confidence, error, symmetry)
 
 
 def prepared_sample(
@@ -199,8 +221,8 @@ def prepared_sample(
     rows = sampled[sampled < len(points)]
     first = rows[: model.config.points]
     normals = cloud_normals(points, first) if normals is None else normals[first]
-    kept, mask = _filled(points[rows], model.config.sample)
-    return kept, _filled(normals, model.config.points)[0], mask
+    kept, mask = filled(points[rows], model.config.sample)
+    return kept, filled(normals, model.config.points)[0], mask
 
 
 def bucket(count: int) -> int:
@@ -232,7 +254,7 @@ def _sample_rows(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray)
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:
     """At most `MAX_POINTS` points and their unit normals, towards the camera; None without any."""
     points, normals = checked_cloud(
-        cloud, fewest=MIN_POINTS, shortest=_SHORTEST, longest=_LONGEST, what="an object"
+        cloud, fewest=MIN_POINTS, shortest=SHORTEST, longest=LONGEST, what="an object"
     )
     if len(points) > MAX_POINTS:
         seed = np.asarray(jax.random.key_data(key)).ravel()
@@ -251,11 +273,11 @@ def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray
 def _padded(
     points: np.ndarray, normals: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    filled, mask = _filled(points, size)
-    return filled, _filled(normals, size)[0], mask
+    padded, mask = filled(points, size)
+    return padded, filled(normals, size)[0], mask
 
 
-def _filled(rows: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+def filled(rows: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows of zeros after these, up to `size`; and which are not."""
     return np.pad(rows, ((0, size - len(rows)), (0, 0))), np.arange(size) < len(rows)
 

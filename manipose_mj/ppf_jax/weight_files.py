@@ -28,6 +28,7 @@ FORMAT_VERSION = 2  # of the configuration's names and of the arrays' order
 _HEADER = "header"
 MethodName: TypeAlias = Literal["ours", "cppf"]
 LabelSet: TypeAlias = Literal["unified", "original"]
+Cameras: TypeAlias = Literal["one", "several"]
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,13 @@ class TrainedModel:
       model: The networks.
       categories: Of the objects it was trained on.
       labels: What it was trained to find: unified labels, or the frames of the objects' sources.
+      cameras: How many saw each of the clouds that it was trained on.
     """
 
     model: EstimatingModel
     categories: tuple[str, ...]
     labels: LabelSet = "unified"
+    cameras: Cameras = "one"
 
     @property
     def method(self) -> MethodName:
@@ -57,6 +60,7 @@ def save_weights(path: Path, trained: TrainedModel) -> None:
         "categories": trained.categories,
         "kind": trained.method,
         "labels": trained.labels,
+        "cameras": trained.cameras,
         "config": dataclasses.asdict(trained.model.config),
     }
     leaves = jax.tree.leaves(trained.model)
@@ -102,12 +106,13 @@ def load_weights(path: Path) -> TrainedModel:
             raise ValueError("shapes")
         categories = tuple(header["categories"])
         labels = header["labels"]
+        cameras = header.get("cameras", "one")  # files of single views do not say
     except (KeyError, TypeError, ValueError):
         raise InputError(
             f"{path}: the weights do not fit their configuration; train again"
         ) from None
     model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
-    return TrainedModel(model, categories, labels)
+    return TrainedModel(model, categories, labels, cameras)
 
 
 @contextmanager

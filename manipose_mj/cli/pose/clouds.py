@@ -19,6 +19,7 @@ from manipose_mj.ppf_jax.data.source_frames import SourceLabel, with_source_fram
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
 from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of
+from manipose_mj.ppf_jax.points.cloud_files import read_views
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 
@@ -82,8 +83,8 @@ class PoseClouds:
             return with_source_frames(clouds, self.sources(clouds))
         return clouds
 
-    def part_swapped(self, count: int) -> list[LabelledCloud]:
-        """Views of objects that are made of two training objects each, as training sees them.
+    def part_swapped(self, count: int, setting: str = "training") -> list[LabelledCloud]:
+        """Views of objects that are made of two training objects each.
 
         Raises:
           InputError: They are wanted with the sources' labels, which they have none of; or of fewer
@@ -99,10 +100,20 @@ class PoseClouds:
             return part_swap_clouds(
                 self.categories,
                 count,
-                view_setting("training"),
+                view_setting(setting),
                 jobs=self._jobs,
                 progress=progress.update,
             )
+
+    def of_scans(self, folders: Sequence[Path], known: CommonSymmetry) -> list[LabelledCloud]:
+        """The views in folders of `read_views` of what is of the category, or of the type, and has `known`.
+
+        Raises:
+          InputError: A folder has no views.
+        """
+        scans = [scan for folder in folders for scan in read_views(folder)]
+        chosen = [scan for scan in scans if self._name in (scan.category, scan.object_type)]
+        return [cloud for scan in chosen if known.holds(scan.symmetry) for cloud in scan.clouds]
 
     def fitting_assets(
         self, directories: Sequence[Path], known: CommonSymmetry

@@ -41,7 +41,8 @@ def evaluate_pose(
       name: A category, such as mug; or a type, axial, mirror or functional.
       weights: File that manipose pose train wrote; those of the package without it.
       labels: What the estimator was trained on.
-      setting: From where objects are seen: anywhere, resting, tasks, clean, occluded, training.
+      setting: From where objects are seen: anywhere, resting, tasks, clean, occluded, training; several and
+        several_tasks ask the networks that look through several cameras at once.
       split: Of the catalogue.
       assets: Evaluate on the assets in this folder that are of the category or type, such as real
         scans, instead of the catalogue's.
@@ -68,7 +69,9 @@ def evaluate_pose(
     from manipose_mj.ppf_jax.estimator import PoseEstimator
     from manipose_mj.ppf_jax.evaluation.pose_metrics import most_confident, pose_errors, summary
     from manipose_mj.ppf_jax.evaluation.pose_predictions import catalogue_hulls, predict
+    from manipose_mj.ppf_jax.fused_views import FusedViewEstimator
 
+    several = view_setting(setting).cameras != (1, 1)
     foreign = chosen_estimator(estimator, estimator_args, give_cad)
     if foreign is not None and (weights is not None or labels == "original"):
         raise InputError("--weights and --labels are of the package's estimator; leave them out")
@@ -77,9 +80,15 @@ def evaluate_pose(
     elif weights is None:
         if labels == "original":
             raise InputError("the package's weights are of unified labels; give --weights FILE")
-        own, asked = PoseEstimator.load(name), None
+        cameras = "several" if several else "one"
+        own, asked = PoseEstimator.load(name, cameras=cameras), None
     else:
         own, asked = PoseEstimator.from_file(weights, labels=labels), None
+    if own is not None and several != (own.trained.cameras == "several"):
+        raise InputError(
+            f"weights of networks that look through {own.trained.cameras}, setting {setting!r} of "
+            f"{'several' if several else 'one'}; choose another setting or other weights"
+        )
     method = own.trained.method if own is not None else str(estimator)
     rows = []
     categories = (name,) if assets is not None else PoseClouds(name).categories
@@ -101,7 +110,7 @@ def evaluate_pose(
         elif labels == "unified":
             hulls = catalogue_hulls(clouds)
         if own is not None:
-            found = predict(own, clouds)
+            found = predict(FusedViewEstimator(own) if several else own, clouds)
         errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls, textured=textured)
         sure = summary(errors.of(most_confident(found.confidence, KEPT)))
         figures = {k: v for k, v in summary(errors).items() if not np.isnan(v)}

@@ -13,6 +13,7 @@ from manipose_mj.console.process import CORES, compile_at_once_on_gpus, one_thre
 from manipose_mj.errors import InputError
 
 WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
+SEVERAL = "several"  # the setting of what several cameras see at once
 HELD_OUT = "anywhere"  # the setting that the curve's errors are of, as the tables are
 Name = Annotated[Positional[str], arg(metavar="CATEGORY|TYPE")]
 
@@ -31,6 +32,7 @@ def train_pose(
     assets: Annotated[tuple[Path, ...], arg(metavar="DIR...")] = (),
     asset_views: int = 96,
     asset_part_swaps: int = 0,
+    scan_views: Annotated[tuple[Path, ...], arg(metavar="DIR...")] = (),
     batch: int = 64,
     steps: int = 20_000,
     minutes: Annotated[float | None, arg(help_behavior_hint="")] = None,
@@ -55,12 +57,14 @@ def train_pose(
       setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
       views: Of each object in each setting.
       part_swaps: Of a type, so many objects besides that are made of two of different categories, 32 views
-        each in the setting training.
+        each in the setting several if that is among the settings, else in training.
       assets: Folders of built assets, such as your scans, that are trained on besides: those of the category or
         type.
       asset_views: Of each of these assets in each setting.
       asset_part_swaps: So many objects besides that are made of one of these assets and another of them or a
         training object, 32 views each in the setting training.
+      scan_views: Folders of views that benchmarks/flips/scan_views.py rendered, which are trained on besides: those
+        of the category or type.
       batch: Clouds in a step.
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
@@ -86,7 +90,8 @@ def train_pose(
     from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
-    made_of_two = source.part_swapped(part_swaps)
+    several = next((each for each in setting if each == SEVERAL), "training")
+    made_of_two = source.part_swapped(part_swaps, several)
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     clouds += made_of_two
     known = common_symmetry(cloud.symmetry for cloud in clouds)
@@ -94,10 +99,15 @@ def train_pose(
     for each in setting:
         clouds += source.of_assets(scans, each, asset_views)
     clouds += source.part_swapped_assets(scans, asset_part_swaps)
+    clouds += source.of_scans(scan_views, known)
     chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)
-    held_out = source.rendered("test", HELD_OUT, 1 + checks * batch // source.objects("test"))
+    held_out = source.rendered(
+        "test",
+        SEVERAL if several == SEVERAL else HELD_OUT,
+        1 + checks * batch // source.objects("test"),
+    )
     config = chosen.configured(clouds)
     stream = batch_stream(held_out, batch, seed, points=config.points)(0)
     feed = batch_stream(clouds, batch, seed, points=config.points)
@@ -121,7 +131,8 @@ def train_pose(
         )
     if chosen.tuned is not None:
         model = chosen.tuned(model, list(islice(feed(0), checks)))
-    save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels))
+    cameras = "several" if several == SEVERAL else "one"
+    save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels, cameras))
     draw_curve(folder / CURVE_FILE, folder / CURVE_PICTURE)
     output.standard_output().print(
         f"trained on {len(clouds)} views of {', '.join(source.categories)}; {folder / WEIGHTS_FILE}",

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 from dm_control import mjcf
@@ -19,15 +18,19 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
+from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SPARE_CAMERAS
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
+from manipose_mj.control.perception.kind_estimators import shipped_estimator
 from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
 from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.pose_sensing import (
     MIN_VIEW_POINTS,
     Estimator,
+    EstimatorOfViews,
     SensedPose,
+    random_keys,
     sense_pose,
     weighed,
 )
@@ -40,33 +43,12 @@ from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, pose_error, transform
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import OnTableGoal, PoseGoal, TakenOutGoal
-from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
 
-# What an estimating agent looks through: a depth camera's noise, at a third of its usual pixels.
-CAMERAS = ("front", "left", "right")
-SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
-# Behind the robot and over its shoulders: they see the front of furniture, and what leaves an estimate uncertain. The
-# first is the highest.
-_LOOKED_AT = (0.72, 0.0, 0.15)
-FRONT_VIEWS = (
-    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
-    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT),
-    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
-)
-FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
-SENSORS = SensorConfig(
-    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS),
-    height=240,
-    width=320,
-    depth_model="structured_light",
-    renderer="ray",  # colours that do not depend on the machine; nobody but estimators of others looks
-)
 _SURE = 0.6  # confidence from which on an estimate is kept for as long as it fits what is seen
-_TRUSTED = (
-    0.8  # confidence under which all cameras are asked before anything is done with an estimate
-)
+_TRUSTED = 0.8  # confidence under which all cameras are asked before an estimate is used
 _AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
+_MORE = 1.5  # times the points that a shape was found by, from which on it is found anew
 _BETTER = 0.9  # of what is left of the weighed misfit, for another pose to replace it
 # How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
 # they lose it: [m], and as a share of its width.
@@ -96,7 +78,7 @@ class EstimatedPerception:
         physics: mjcf.Physics,
         world: World | None = None,
         *,
-        estimators: Callable[[ObjectKind], Estimator] | None = None,
+        estimators: Callable[[ObjectKind], Estimator | EstimatorOfViews] | None = None,
         meshes: Callable[[Asset], Mapping[str, np.ndarray]] | None = None,
         grasps: GraspSource = "cloud",
     ) -> None:
@@ -107,12 +89,13 @@ class EstimatedPerception:
             through `SPARE_CAMERAS` and those over the shoulders where it has to.
           physics: The environment's.
           world: Furniture and surroundings; those of the simulator by default.
-          estimators: The estimator of a kind; `PoseEstimator.load` by default.
+          estimators: The estimator of a kind; by default `FusedViewEstimator` of those in the catalogue,
+            `PoseEstimator` of others.
           meshes: The mesh of an object, if estimators are given it; planning never sees it.
           grasps: Where grasps come from.
         """
         self._task, self._physics = task, physics
-        self._load = estimators or _load
+        self._load = estimators or shipped_estimator
         self._meshes = meshes
         self._world = world or SimulatedWorld(task, physics)
         self.feels_joints = self._world.feels_joints
@@ -126,11 +109,10 @@ class EstimatedPerception:
         self._grasps: dict[str, Callable[[], GraspSet]] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
         self._held_width = 0.0  # of the gripper then [m]
-        self._dropped: set[str] = (
-            set()
-        )  # objects that lie otherwise than their grasps were made for
-        self._time = -1.0
-        self._keys = _keys(0)
+        # Objects that lie otherwise than their grasps were made for.
+        self._dropped: set[str] = set()
+        self._time = self._looked = -1.0
+        self._keys = random_keys(0)
         self.sources: Mapping[str, str] = {
             "objects": "estimated",
             "kinds": TOLD_OF_KINDS,
@@ -145,7 +127,7 @@ class EstimatedPerception:
           StageFailure: An object that a goal is about is not seen, nor is anything that may hide it.
           InputError: There are no weights for a category or its type.
         """
-        self._keys = _keys(seed)
+        self._keys = random_keys(seed)
         self._held, self._known, self._grasps, self._dropped = None, {}, {}, set()
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
@@ -153,7 +135,7 @@ class EstimatedPerception:
         self._find_objects()
         if self._covered and not (self._known and self._among_others):
             raise StageFailure("perception", f"no camera sees enough of {min(self._covered)}")
-        self._time = float(self._physics.data.time)
+        self._time = self._looked = float(self._physics.data.time)
         self._build()
 
     @property
@@ -173,16 +155,48 @@ class EstimatedPerception:
         return self.unseen - {goal.object for goal in goals if isinstance(goal, TakenOutGoal)}
 
     @property
+    def _uncertain(self) -> tuple[str, ...]:
+        """What is estimated with a confidence that does not last, and not in the hand."""
+        held = None if self._held is None else self._held[0]
+        known = self._known.items()
+        return tuple(name for name, s in known if s.confidence < _SURE and name != held)
+
+    @property
+    def _outgrown(self) -> tuple[str, ...]:
+        """What goals are about, sure, not in the hand, and seen by many more points than its shape was found by."""
+        held = {self._held[0]} if self._held is not None else set()
+        found = []
+        for name in sorted((self._needed & self._known.keys()) - held - set(self._uncertain)):
+            seen = sum(len(view) for view in self._views.of(self._physics, name))
+            if seen > _MORE * self._known[name].points:
+                found.append(name)
+        return tuple(found)
+
+    @property
     def _among_others(self) -> bool:
         """Whether the goals are about objects among others alone: these can be moved off what they hide."""
         only_poses = all(isinstance(goal, PoseGoal | OnTableGoal) for goal in self._task.goals)
         return only_poses and not self._task.furniture_masks
 
-    def look_for_covered(self) -> None:
-        """After an object was moved: look for those of goals that it may have hidden."""
-        if self._covered:
-            self.observe()
-            self._find_objects()
+    def look_around(self) -> None:
+        """Between two plans: look for what goals are about and others may have hidden, anew at what is uncertain, and
+        at what goals are about and shows more of itself than when its shape was found."""
+        now = float(self._physics.data.time)
+        again = () if now == self._looked else (*self._uncertain, *self._outgrown)
+        if not (self._covered or again):
+            return
+        self.observe()
+        self._looked, before = now, dict(self._known)
+        for name in again:
+            known, sensed = self._known[name], self._looked_at(name)
+            if sensed is None:
+                continue
+            outgrown = sensed.confidence >= _SURE and sensed.points > _MORE * known.points
+            if outgrown or sensed.confidence > known.confidence:
+                self._known[name] = sensed
+                self._grasps.pop(name)
+        self._find_objects()
+        if any(sensed is not before.get(name) for name, sensed in self._known.items()):
             self._build()
 
     def look_again(self) -> None:
@@ -205,16 +219,19 @@ class EstimatedPerception:
 
     def _find_objects(self) -> None:
         """Estimate what is seen for the first time."""
-        for name, kind in self._kinds().items():
-            if name in self._known:
-                continue
-            views = self._views.of(self._physics, name)
-            sensed = self._sensed(name, views, shapes_of(kind))
-            if sensed is not None:
-                seen = views or self._more_views.of(self._physics, name)
-                sensed = sensed_if_flat(kind, sensed, seen)
+        for name in self._kinds():
+            sensed = None if name in self._known else self._looked_at(name)
             if sensed is not None:
                 self._known[name] = sensed
+
+    def _looked_at(self, name: str) -> SensedPose | None:
+        """The estimate of what may have any shape of its kind."""
+        kind, views = self._kinds()[name], self._views.of(self._physics, name)
+        sensed = self._sensed(name, views, shapes_of(kind), again=True)
+        if sensed is None:
+            return None
+        seen = views or self._more_views.of(self._physics, name)
+        return sensed_if_flat(kind, sensed, seen)
 
     def _build(self) -> None:
         for name in self._known:
@@ -297,6 +314,7 @@ class EstimatedPerception:
             return before
         if held and not self._may_be_lost() and not _nearly(sensed, before):
             return before
+        sensed = replace(sensed, points=before.points)  # the shape is the old one
         if self._held is not None and held:
             self._held = (name, invert(tcp) @ sensed.pose)
             if not _nearly(sensed, before):
@@ -308,12 +326,17 @@ class EstimatedPerception:
         return self.robot()[1] < self._held_width - min(_LOST, _LOST_SHARE * self._held_width)
 
     def _sensed(
-        self, name: str, views: tuple[ObjectView, ...], shapes: ShapeFitter
+        self,
+        name: str,
+        views: tuple[ObjectView, ...],
+        shapes: ShapeFitter,
+        *,
+        again: bool = False,
     ) -> SensedPose | None:
-        """From these views; from all cameras' where they leave an object uncertain that was not known."""
+        """From these views; from all cameras', if it may look again, where they leave an object uncertain."""
         estimator = self._load(self._kinds()[name])
         sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
-        if sensed is not None and (sensed.confidence >= _TRUSTED or name in self._known):
+        if sensed is not None and (sensed.confidence >= _TRUSTED or not again):
             return sensed
         views = self._more_views.of(self._physics, name)
         second = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
@@ -373,23 +396,3 @@ def _nearly(sensed: SensedPose, before: SensedPose) -> bool:
     """Whether two poses differ by no more than an object slips in the hand."""
     shift, turn = pose_error(sensed.pose, before.pose, before.shape.label.symmetry)
     return bool(shift < _IN_HAND[0] and turn < _IN_HAND[1])
-
-
-def _load(kind: ObjectKind) -> Estimator:
-    from manipose_mj.ppf_jax.estimator import PoseEstimator  # loads JAX
-
-    return PoseEstimator.load(kind.category if kind.in_catalogue else kind.object_type)
-
-
-def _keys(seed: int) -> Callable[[], Any]:
-    """A new random key at every call, always the same ones for a seed."""
-    count = 0
-
-    def next_key() -> Any:
-        import jax
-
-        nonlocal count
-        count += 1
-        return jax.random.fold_in(jax.random.key(seed), count)
-
-    return next_key

@@ -64,8 +64,8 @@ class OraclePerception:
     def pushed(self, name: str, opening: float) -> None:
         """Nothing to learn."""
 
-    def look_for_covered(self) -> None:
-        """Nothing is hidden."""
+    def look_around(self) -> None:
+        """Nothing is hidden or uncertain."""
 
     def look_again(self) -> None:
         """Nothing is hidden."""

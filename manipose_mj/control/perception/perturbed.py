@@ -80,9 +80,9 @@ class PerturbedPerception:
         """The hand pushed a part to about this opening [m or rad]."""
         self._perception.pushed(name, opening)
 
-    def look_for_covered(self) -> None:
-        """After an object was moved: look for those of goals that it may have hidden."""
-        self._perception.look_for_covered()
+    def look_around(self) -> None:
+        """Between two plans: look for what others may have hidden, and anew at what is uncertain."""
+        self._perception.look_around()
 
     def look_again(self) -> None:
         """Look at what was opened, and into it; what is found gets an error of its own."""

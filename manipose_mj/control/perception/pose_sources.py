@@ -6,7 +6,8 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset
-from manipose_mj.control.perception.estimated import FRONT_CAMERAS, SENSORS, EstimatedPerception
+from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SENSORS
+from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.perception.perturbed import (

@@ -62,8 +62,8 @@ class Perception(Protocol):
         """The hand pushed a part to about this opening [m or rad]."""
         ...
 
-    def look_for_covered(self) -> None:
-        """After an object was moved: look for those of goals that it may have hidden."""
+    def look_around(self) -> None:
+        """Between two plans: look for what others may have hidden, and anew at what is uncertain."""
         ...
 
     def look_again(self) -> None:

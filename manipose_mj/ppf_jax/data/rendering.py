@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter, zoom
+from scipy.spatial.transform import Rotation
 
 from manipose_mj.assets.geometry import Shape
 from manipose_mj.assets.label import PoseLabel
@@ -20,15 +21,21 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight, structured_light
 from manipose_mj.mjcf.cameras.depth_normals import depth_normals
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
-from manipose_mj.poses import transform
+from manipose_mj.poses import compose, invert, transform
 from manipose_mj.ppf_jax.data.occlusion import Occluder, nearer, occluded
 from manipose_mj.ppf_jax.data.rasteriser import Raster, Triangles, pixel_rays, rasterise
-from manipose_mj.ppf_jax.data.view_settings import Placement, ViewSetting, place
+from manipose_mj.ppf_jax.data.view_settings import (
+    Placement,
+    ViewSetting,
+    place,
+    place_before_several,
+)
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, LabelledCloud
 
 MIN_POINTS = 32  # a view with fewer is drawn again: nobody can say anything about it
 MARGIN = 10  # around the object, for what bleeds into its outline [pixels]
 _DRAWS = 40
+_CALIBRATION = (np.deg2rad(0.2), 0.001)  # deviations of cameras' poses to one another [rad, m]
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,9 @@ def render_clouds(
       InputError: The setting has a table and the subject no way to lie on it, or hardly any view
         shows enough of the object.
     """
+    if setting.cameras != (1, 1):
+        numbers = range(first, first + views)
+        return [_fused(subject, setting, rng, occluders, f"{subject.name}/{i}") for i in numbers]
     drawn = drawn_views(subject, setting, views, rng, occluders=occluders, first=first)
     return [cloud for _, cloud in drawn]
 
@@ -159,9 +169,21 @@ def render_view(
     occluders: Sequence[Occluder] = (),
 ) -> View:
     """Draw one view; only the window of the image that holds the object."""
-    centre = subject.bounds.mean(axis=0)
-    radius = 0.5 * float(np.linalg.norm(np.ptp(subject.bounds, axis=0)))
-    placement = place(setting, centre, radius, list(subject.rests), rng)
+    return view_of(
+        subject, setting, place(setting, *_drawn_by(subject), rng), rng, occluders=occluders
+    )
+
+
+def view_of(
+    subject: Subject,
+    setting: ViewSetting,
+    placement: Placement,
+    rng: np.random.Generator,
+    *,
+    occluders: Sequence[Occluder] = (),
+) -> View:
+    """The view of an object that is somewhere."""
+    radius = _drawn_by(subject)[1]
     window = _window(subject, placement)
     drawn = rasterise([(subject.triangles, placement.T_camera_mesh)], window)
     if rng.random() < setting.occluded:
@@ -193,6 +215,64 @@ def cloud_of_view(
     rays = pixel_rays(view.intrinsics)[pixels[:, 0], pixels[:, 1]]
     points = rays * view.depth[pixels[:, 0], pixels[:, 1]][:, None]
     return points.astype(np.float32), normals.astype(np.float32)
+
+
+def _fused(
+    subject: Subject,
+    setting: ViewSetting,
+    rng: np.random.Generator,
+    occluders: Sequence[Occluder],
+    name: str,
+) -> LabelledCloud:
+    """What several cameras see, in the frame of the one that sees most; at most `MAX_POINTS / 4` of each."""
+    for _ in range(_DRAWS):
+        placements = place_before_several(setting, *_drawn_by(subject), rng)
+        views = [view_of(subject, setting, each, rng, occluders=occluders) for each in placements]
+        seen = [(view.T_camera_mesh, *cloud_of_view(view, rng)) for view in views]
+        seen = [each for each in seen if len(each[1])]
+        if sum(len(points) for _, points, _ in seen) >= MIN_POINTS:
+            break
+    else:
+        raise InputError(
+            f"{subject.name}: {_DRAWS} rigs of setting {setting.name!r} in a row see fewer than {MIN_POINTS} points"
+        )
+    main = max(seen, key=lambda each: len(each[1]))[0]
+    points, normals, eyes = [], [], []
+    for pose, own, towards in seen:
+        turn, shift = np.eye(3), np.zeros(3)
+        if pose is not main:
+            across = main @ invert(pose) @ _miscalibration(rng)
+            turn, shift = across[:3, :3], across[:3, 3]
+        few = own[: MAX_POINTS // 4]
+        points.append(few @ turn.T + shift)
+        normals.append(towards[: len(few)] @ turn.T)
+        eyes.append(np.broadcast_to(shift, few.shape))
+    cloud = [np.concatenate(rows).astype(np.float32) for rows in (points, normals, eyes)]
+    return LabelledCloud(
+        points=cloud[0],
+        normals=cloud[1],
+        pose=(main @ subject.label.pose).astype(np.float32),
+        extents=np.asarray(subject.label.extents, np.float32),
+        symmetry=subject.label.symmetry,
+        name=name,
+        category=subject.category,
+        eyes=cloud[2],
+    )
+
+
+def _miscalibration(rng: np.random.Generator) -> Float[np.ndarray, "4 4"]:
+    turn, shift = _CALIBRATION
+    return compose(
+        Rotation.from_rotvec(rng.normal(0.0, turn, 3)).as_matrix(), rng.normal(0.0, shift, 3)
+    )
+
+
+def _drawn_by(
+    subject: Subject,
+) -> tuple[Float[np.ndarray, "3"], float, list[tuple[Float[np.ndarray, "3 3"], float, float]]]:
+    """What placements are drawn by: the box's centre, half its diagonal, ways to lie."""
+    radius = 0.5 * float(np.linalg.norm(np.ptp(subject.bounds, axis=0)))
+    return subject.bounds.mean(axis=0), radius, list(subject.rests)
 
 
 def _cloud(subject: Subject, view: View, rng: np.random.Generator, name: str) -> LabelledCloud:

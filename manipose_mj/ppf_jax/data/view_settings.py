@@ -32,6 +32,7 @@ class ViewSetting:
       sensor: None for exact depth.
       taper: How much wider or narrower the upper end of an object may be drawn than it is, as a share
         (`tapering.py`); of rigid objects of the catalogue.
+      cameras: Least and most that look at once; what more than one sees is one cloud.
     """
 
     name: str
@@ -44,6 +45,7 @@ class ViewSetting:
     bleed: float = 0.7
     sensor: StructuredLight | None = KINECT
     taper: float = 0.0
+    cameras: tuple[int, int] = (1, 1)
 
 
 _ANYWHERE = ViewSetting("anywhere", "anywhere")
@@ -64,6 +66,23 @@ SETTINGS: dict[str, ViewSetting] = {
             off_centre=0.7,
             occluded=0.3,
             taper=0.2,
+        ),
+        # The same for networks that look through several cameras.
+        ViewSetting(
+            "several",
+            "anywhere",
+            image_heights=(120, 240, 480),
+            distance=(0.5, 1.3),
+            off_centre=0.7,
+            occluded=0.4,
+            cameras=(2, 4),
+        ),
+        ViewSetting(
+            "several_tasks",
+            "tasks",
+            image_heights=(120, 240, 240, 480),
+            occluded=0.4,
+            cameras=(1, 7),
         ),
     )
 }
@@ -96,6 +115,35 @@ class Placement:
     ground: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None
 
 
+def place_before_several(
+    setting: ViewSetting,
+    centre: Float[np.ndarray, "3"],
+    radius: float,
+    rests: list[tuple[Float[np.ndarray, "3 3"], float, float]],
+    rng: np.random.Generator,
+) -> list[Placement]:
+    """Draw an object before as many cameras as `setting.cameras` says; arguments as of `place`.
+
+    The tasks' usual ones, of each of which an object may be out of sight, or some of all that tasks have.
+    """
+    least, most = setting.cameras
+    if setting.placement != "tasks":
+        count = int(rng.integers(least, most + 1))
+        return [place(setting, centre, radius, rests, rng) for _ in range(count)]
+    T_world_mesh = _on_task_table(rests, rng)
+    if rng.random() < _USUAL:
+        views = [view for view in _TASK_CAMERAS if rng.random() > _OUT_OF_SIGHT]
+        views = views if len(views) >= least else list(_TASK_CAMERAS)
+    else:
+        every = task_views()
+        count = int(rng.integers(least, min(most, len(every)) + 1))
+        views = [list(every)[i] for i in rng.choice(len(every), count, replace=False)]
+    return [
+        _on_table(T_world_mesh, _task_camera(view), _drawn_intrinsics(setting, rng))
+        for view in views
+    ]
+
+
 def place(
     setting: ViewSetting,
     centre: Float[np.ndarray, "3"],
@@ -113,29 +161,67 @@ def place(
         on a table; not needed for `"anywhere"`.
       rng: Draws it.
     """
-    height = int(rng.choice(setting.image_heights))
-    intrinsics = task_intrinsics(height)
+    intrinsics = _drawn_intrinsics(setting, rng)
+    if setting.placement == "tasks":
+        T_world_mesh = _on_task_table(rests, rng)
+        view = _TASK_CAMERAS[rng.integers(len(_TASK_CAMERAS))]
+        return _on_table(T_world_mesh, _task_camera(view), intrinsics)
     if setting.placement == "anywhere":
         rotation = Rotation.random(random_state=rng).as_matrix()
         position = rng.uniform(*setting.distance) * _unit(_off_centre(setting, intrinsics, rng))
         pose = compose(rotation, position - rotation @ centre)
         return Placement(pose, intrinsics, _wall(position, radius, rng))
     T_world_mesh = _resting(rests, rng)
-    if setting.placement == "tasks":
-        spot = np.array([rng.uniform(*_TASK_X), rng.uniform(*_TASK_Y), 0.0])
-        T_world_mesh[:3, 3] += spot
-        T_world_camera = _task_camera(rng)
-    else:
-        target = T_world_mesh[:3, :3] @ centre + T_world_mesh[:3, 3]
-        T_world_camera = _above(target, setting, intrinsics, rng)
+    target = T_world_mesh[:3, :3] @ centre + T_world_mesh[:3, 3]
+    return _on_table(T_world_mesh, _above(target, setting, intrinsics, rng), intrinsics)
+
+
+def task_views() -> dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]]:
+    """Where the tasks' fixed cameras are, those over the robot's shoulders included, and what they look at [m]."""
+    from manipose_mj.mjcf.arena import FIXED_CAMERAS  # loads dm_control
+
+    fixed = {name: (position, target) for name, (position, target, _) in FIXED_CAMERAS.items()}
+    return {**fixed, **_OVER_SHOULDERS}
+
+
+def _on_table(
+    T_world_mesh: Float[np.ndarray, "4 4"],
+    T_world_camera: Float[np.ndarray, "4 4"],
+    intrinsics: Intrinsics,
+) -> Placement:
     T_camera_world = invert(T_world_camera)
     ground = (T_camera_world[:3, 3], T_camera_world[:3, 2])
     return Placement(T_camera_world @ T_world_mesh, intrinsics, ground)
 
 
+def _on_task_table(
+    rests: list[tuple[Float[np.ndarray, "3 3"], float, float]], rng: np.random.Generator
+) -> Float[np.ndarray, "4 4"]:
+    T_world_mesh = _resting(rests, rng)
+    T_world_mesh[:3, 3] += np.array([rng.uniform(*_TASK_X), rng.uniform(*_TASK_Y), 0.0])
+    return T_world_mesh
+
+
+def _task_camera(view: str) -> Float[np.ndarray, "4 4"]:
+    position, target = (np.array(point) for point in task_views()[view])
+    return compose(_looking(position, target), position)
+
+
+def _drawn_intrinsics(setting: ViewSetting, rng: np.random.Generator) -> Intrinsics:
+    return task_intrinsics(int(rng.choice(setting.image_heights)))
+
+
 # Of `manipose_mj.tasks.single_object.target_pose` [m], and the cameras that tasks fuse by default.
 _TASK_X, _TASK_Y = (0.38, 0.60), (-0.28, 0.28)
 _TASK_CAMERAS = ("front", "left", "right")
+# As in `manipose_mj.control.perception.camera_rig`, which this package may not know.
+_LOOKED_AT = (0.72, 0.0, 0.15)
+_OVER_SHOULDERS = {
+    "above": ((-0.35, 0.0, 1.25), _LOOKED_AT),
+    "left_shoulder": ((-0.05, 0.6, 0.75), _LOOKED_AT),
+    "right_shoulder": ((-0.05, -0.6, 0.75), _LOOKED_AT),
+}
+_USUAL, _OUT_OF_SIGHT = 0.7, 0.15  # shares of rigs, and of each of their cameras
 TASK_FOVY = np.deg2rad(45.0)  # of the tasks' fixed cameras, and at 480 rows about the Kinect's
 _ROLL = np.deg2rad(10.0)  # deviation of a hand-mounted camera's roll
 
@@ -191,13 +277,6 @@ def _looking(position: np.ndarray, target: np.ndarray) -> Float[np.ndarray, "3 3
     forward = _unit(target - position)
     right = _unit(np.cross(forward, [0.0, 0.0, 1.0]))
     return np.stack([right, np.cross(forward, right), forward], axis=1)
-
-
-def _task_camera(rng: np.random.Generator) -> Float[np.ndarray, "4 4"]:
-    from manipose_mj.mjcf.arena import FIXED_CAMERAS  # loads dm_control
-
-    position, target, _ = FIXED_CAMERAS[_TASK_CAMERAS[rng.integers(len(_TASK_CAMERAS))]]
-    return compose(_looking(np.array(position), np.array(target)), np.array(position))
 
 
 def _unit(vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:

@@ -44,8 +44,10 @@ class SeenObject:
     T_camera_label: Float[np.ndarray, "4 4"]
 
 
-def check_untapered(setting: ViewSetting) -> None:
-    """Raise `InputError` where a setting draws objects other than they are."""
+def check_single_views(setting: ViewSetting) -> None:
+    """Raise `InputError` where a setting draws objects other than they are, or has several cameras look at once."""
+    if setting.cameras != (1, 1):
+        raise InputError(f"setting {setting.name!r} has no single views; choose another")
     if setting.taper:
         raise InputError(
             f"setting {setting.name!r} draws objects wider and narrower than they are; choose another"
@@ -64,9 +66,9 @@ def catalogue_views(
     """The views of `catalogue_clouds` of one object, in order.
 
     Raises:
-      InputError: The setting draws objects other than they are.
+      InputError: The setting draws objects other than they are, or fuses views.
     """
-    check_untapered(setting)
+    check_single_views(setting)
     subject = catalogue_subject(category, index, resting=setting.placement != "anywhere")
     stem = zlib.crc32(subject.name.encode())
     occluders = catalogue_occluders(stem) if setting.occluded else []
@@ -83,9 +85,9 @@ def asset_views(
     """The views of `asset_clouds`, in order; arguments and errors as there.
 
     Raises:
-      InputError: The setting draws objects other than they are.
+      InputError: The setting draws objects other than they are, or fuses views.
     """
-    check_untapered(setting)
+    check_single_views(setting)
     for asset in chosen_assets(directory, name):
         subject = asset_subject(asset)
         rng = np.random.default_rng(zlib.crc32(asset.name.encode()))

@@ -16,6 +16,7 @@ from manipose_mj.errors import unknown_name
 from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.data.view_cache import catalogue_subject
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
+from manipose_mj.ppf_jax.fused_views import FusedViewEstimator
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
@@ -42,7 +43,7 @@ class Predictions:
 
 
 def predict(
-    estimator: PoseEstimator | TwoNetworkFusion,
+    estimator: PoseEstimator | TwoNetworkFusion | FusedViewEstimator,
     clouds: Sequence[LabelledCloud],
     *,
     batch: int = 32,
@@ -73,7 +74,8 @@ def predict(
 
 
 def _one_by_one(
-    estimator: PoseEstimator | TwoNetworkFusion, clouds: Sequence[LabelledCloud]
+    estimator: PoseEstimator | TwoNetworkFusion | FusedViewEstimator,
+    clouds: Sequence[LabelledCloud],
 ) -> float:
     """Median milliseconds for one object's bare points, from which normals are estimated."""
     key = jax.random.key(0)

@@ -1,15 +1,63 @@
-"""Files of the cloud cache: some views of one object each."""
+"""Files of clouds: some views of one object each, in the cache or in a folder with an index."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.label import ObjectType
+from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.storage.cache_file import new_cache_file
+
+INDEX = "scans.json"  # of a folder: the category and the object type of each file
+
+
+@dataclass(frozen=True)
+class ScanViews:
+    """The views of one scan.
+
+    Attributes: name; category; object_type, the label's rule; clouds, whose poses are of the same label frame.
+    """
+
+    name: str
+    category: str
+    object_type: ObjectType
+    clouds: tuple[LabelledCloud, ...]
+
+    @property
+    def symmetry(self) -> SymmetryGroup:
+        """Of the shape."""
+        return self.clouds[0].symmetry
+
+    @property
+    def in_catalogue(self) -> bool:
+        """Whether training had the kind."""
+        row = CATALOGUE.get(self.category)
+        return row is not None and row.object_type == self.object_type
+
+
+def read_views(folder: Path) -> list[ScanViews]:
+    """All scans that `benchmarks/flips/scan_views.py` rendered into a folder.
+
+    Raises:
+      InputError: There are none.
+    """
+    try:
+        index = json.loads((folder / INDEX).read_text())
+    except (OSError, ValueError):
+        raise InputError(f"{folder}: no views of scans; render some with scan_views.py") from None
+    return [
+        ScanViews(name, category, kind, tuple(read_clouds(folder / f"{name}.npz", name, category)))
+        for name, (category, kind) in sorted(index.items())
+    ]
 
 
 def write_clouds(path: Path, clouds: Sequence[LabelledCloud]) -> None:
@@ -19,17 +67,20 @@ def write_clouds(path: Path, clouds: Sequence[LabelledCloud]) -> None:
       InputError: The file cannot be written.
     """
     group = clouds[0].symmetry
+    eyes = [cloud.eyes for cloud in clouds if cloud.eyes is not None]
+    arrays: dict[str, Any] = {
+        "points": np.concatenate([cloud.points for cloud in clouds]),
+        "normals": np.concatenate([cloud.normals for cloud in clouds]),
+        "starts": np.cumsum([0, *(len(cloud) for cloud in clouds)]),
+        "pose": np.stack([cloud.pose for cloud in clouds]),
+        "extents": clouds[0].extents,
+        "rotations": group.rotations,
+        "axial": group.axial,
+    }
+    if eyes:
+        arrays["eyes"] = np.concatenate(eyes)
     with new_cache_file(path) as scratch:
-        np.savez(
-            scratch,
-            points=np.concatenate([cloud.points for cloud in clouds]),
-            normals=np.concatenate([cloud.normals for cloud in clouds]),
-            starts=np.cumsum([0, *(len(cloud) for cloud in clouds)]),
-            pose=np.stack([cloud.pose for cloud in clouds]),
-            extents=clouds[0].extents,
-            rotations=group.rotations,
-            axial=group.axial,
-        )
+        np.savez(scratch, **arrays)
 
 
 def read_clouds(path: Path, name: str, category: str, *, first: int = 0) -> list[LabelledCloud]:
@@ -49,6 +100,7 @@ def read_clouds(path: Path, name: str, category: str, *, first: int = 0) -> list
                 symmetry=group,
                 name=f"{name}/{first + i}",
                 category=category,
+                eyes=arrays["eyes"][rows] if "eyes" in arrays else None,
             )
         )
     return clouds

@@ -21,16 +21,18 @@ SAMPLE_POINTS = 256  # of a cloud as the network sees it
 
 @dataclass(frozen=True)
 class LabelledCloud:
-    """What one camera saw of one object, and where the object's label was.
+    """What one camera saw of one object, or several together, and where the object's label was.
 
     Attributes:
-      points: `(n, 3)` float32 [m], camera frame (OpenCV's: x right, y down, z forward).
-      normals: `(n, 3)` float32, unit, towards the camera.
+      points: `(n, 3)` float32 [m], camera frame (OpenCV's: x right, y down, z forward); of several cameras, the
+        frame of one of them.
+      normals: `(n, 3)` float32, unit, towards the camera that saw the point.
       pose: `(4, 4)` float32, `T_camera_label`.
       extents: `(3,)` float32 [m], the bounding box along the label's axes.
       symmetry: Proper rotations, in the label frame, that leave the shape unchanged.
       name: The object and the view, `mug_003/17`.
       category: What estimators are told.
+      eyes: `(n, 3)` float32 [m], where the camera that saw each point is; None where that is the origin.
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -40,6 +42,7 @@ class LabelledCloud:
     symmetry: SymmetryGroup
     name: str
     category: str
+    eyes: Float[np.ndarray, "n 3"] | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -53,6 +56,7 @@ class CloudBatch:
     Attributes:
       points: `(b, n, 3)` float32 [m], camera frames; 0 in padding.
       normals: `(b, n, 3)` float32, unit, towards the camera; 0 in padding.
+      eyes: `(b, n, 3)` float32 [m], where the camera that saw each point is.
       mask: `(b, n)`, true for points, false for padding, which comes last.
       pose: `(b, 4, 4)` float32, `T_camera_label`.
       extents: `(b, 3)` float32 [m].
@@ -62,6 +66,7 @@ class CloudBatch:
 
     points: Float[Array, "b n 3"]
     normals: Float[Array, "b n 3"]
+    eyes: Float[Array, "b n 3"]
     mask: Bool[Array, "b n"]
     pose: Float[Array, "b 4 4"]
     extents: Float[Array, "b 3"]
@@ -72,7 +77,7 @@ class CloudBatch:
 
     def tree_flatten(self) -> tuple[tuple[Array, ...], None]:
         """The arrays; those of the symmetry group one by one, for it knows nothing of JAX."""
-        own = (self.points, self.normals, self.mask, self.pose, self.extents)
+        own = (self.points, self.normals, self.eyes, self.mask, self.pose, self.extents)
         return (*own, self.symmetry.rotations, self.symmetry.axial), None
 
     @classmethod
@@ -113,7 +118,7 @@ def batch_clouds(
     if most > members:
         raise InputError(f"a symmetry group has {most} members; the batch has room for {members}")
     count = len(clouds)
-    xyz, normals = np.zeros((2, count, points, 3), np.float32)
+    xyz, normals, eyes = np.zeros((3, count, points, 3), np.float32)
     mask = np.zeros((count, points), bool)
     groups = SymmetryGroup.stack([cloud.symmetry for cloud in clouds]).padded(members)
     for i, cloud in enumerate(clouds):
@@ -121,10 +126,13 @@ def batch_clouds(
             raise InputError(f"{cloud.name}: the cloud has no points")
         rows = rng.permutation(len(cloud))[:points]
         xyz[i, : len(rows)], normals[i, : len(rows)] = cloud.points[rows], cloud.normals[rows]
+        if cloud.eyes is not None:
+            eyes[i, : len(rows)] = cloud.eyes[rows]
         mask[i, : len(rows)] = True
     return CloudBatch(
         points=xyz,
         normals=normals,
+        eyes=eyes,
         mask=mask,
         pose=np.stack([cloud.pose for cloud in clouds]).astype(np.float32),
         extents=np.stack([cloud.extents for cloud in clouds]).astype(np.float32),

@@ -44,16 +44,21 @@ class Cloud(eqx.Module):
 
 
 def normalised(
-    points: Float[Array, "n 3"], normals: Float[Array, "n 3"], mask: Bool[Array, "n"]
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+    eyes: Float[Array, "n 3"] | None = None,
 ) -> Cloud:
-    """A cloud in its own units; turning or moving it with the camera changes nothing but `centre`.
+    """A cloud in its own units; turning or moving it with its cameras changes nothing but `centre`.
 
     Args:
-      points: [m], camera frame, the camera at the origin.
+      points: [m], camera frame.
       normals: Unit, towards the camera.
       mask: True for points.
+      eyes: Where the camera that saw each point is [m]; None: at the origin.
     """
-    points, normals, mask = _without_strays(points, normals, mask)
+    views = -_unit(points) if eyes is None else _unit(eyes - points)
+    points, normals, views, mask = _without_strays(points, normals, views, mask)
     rows = mask[:, None]
     centre = _mean(points, mask)
     offsets = jnp.where(rows, points - centre, 0.0)
@@ -61,7 +66,7 @@ def normalised(
     return Cloud(
         points=offsets / scale,
         normals=jnp.where(rows, normals, 0.0),
-        views=jnp.where(rows, -_unit(points), 0.0),
+        views=jnp.where(rows, views, 0.0),
         mask=mask,
         centre=centre,
         scale=scale,
@@ -163,8 +168,11 @@ def random_pairs(
 
 
 def _without_strays(
-    points: Float[Array, "n 3"], normals: Float[Array, "n 3"], mask: Bool[Array, "n"]
-) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"], Bool[Array, "n"]]:
+    points: Float[Array, "n 3"],
+    normals: Float[Array, "n 3"],
+    views: Float[Array, "n 3"],
+    mask: Bool[Array, "n"],
+) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"], Float[Array, "n 3"], Bool[Array, "n"]]:
     """The same rows, those that are far from all else among the padding.
 
     A few points of what is behind an object would move the mean by centimetres.
@@ -175,7 +183,7 @@ def _without_strays(
         near = mask & (offsets < STRAY * _median_distance(points, mask, centre) + _TINY)
         centre = _mean(points, near)
     order = jnp.argsort(~near, stable=True)
-    return points[order], normals[order], near[order]
+    return points[order], normals[order], views[order], near[order]
 
 
 def _mean(points: Float[Array, "n 3"], mask: Bool[Array, "n"]) -> Float[Array, "3"]:

@@ -21,7 +21,6 @@ from manipose_mj.ppf_jax.rigid.features import (
     Cloud,
     normalised,
     random_pairs,
-    sampled,
     sampled_rows,
 )
 from manipose_mj.ppf_jax.rigid.network import NetworkConfig, PairVotes, VotingNetwork
@@ -82,6 +81,7 @@ class EstimatingModel(Protocol):
         mask: Bool[Array, "n"],
         *,
         key: PRNGKeyArray,
+        eyes: Float[Array, "n 3"] | None = None,
     ) -> Estimates:
         """The pose of the object that one cloud shows; arguments as of `estimate_cloud`."""
         ...
@@ -107,9 +107,10 @@ class PoseModel(eqx.Module):
         mask: Bool[Array, "n"],
         *,
         key: PRNGKeyArray,
+        eyes: Float[Array, "n 3"] | None = None,
     ) -> Estimates:
         """`estimate_cloud` with this model."""
-        return estimate_cloud(self, points, normals, mask, key=key)
+        return estimate_cloud(self, points, normals, mask, key=key, eyes=eyes)
 
     def sample_rows(self, mask: Bool[Array, "n"], *, key: PRNGKeyArray) -> Int[Array, "sample"]:
         """The rows of a cloud that `estimate` uses; only the first `config.points` need normals."""
@@ -145,6 +146,7 @@ def estimate_cloud(
     mask: Bool[Array, "n"],
     *,
     key: PRNGKeyArray,
+    eyes: Float[Array, "n 3"] | None = None,
 ) -> Estimates:
     """Vote, refine, add what the best may be mistaken for, refine that, score all, rank.
 
@@ -152,16 +154,16 @@ def estimate_cloud(
 
     Args:
       model: The networks.
-      points: [m], camera frame, the camera at the origin.
+      points: [m], camera frame.
       normals: Unit, towards the camera.
       mask: True for points, false for padding.
       key: Draws the sample, the pairs and the free space.
+      eyes: Where the camera that saw each point is [m]; None: at the origin.
     """
-    sample_key = jax.random.split(key, 3)[0]
-    points, normals, mask = sampled(
-        points, normals, mask, count=model.config.sample, key=sample_key
-    )
-    return estimate_sample(model, points, normals[: model.config.points], mask, key=key)
+    rows = model.sample_rows(mask, key=key)
+    seen_from = None if eyes is None else eyes[rows]
+    first = rows[: model.config.points]
+    return estimate_sample(model, points[rows], normals[first], mask[rows], key=key, eyes=seen_from)
 
 
 def estimate_sample(
@@ -171,9 +173,10 @@ def estimate_sample(
     mask: Bool[Array, "sample"],
     *,
     key: PRNGKeyArray,
+    eyes: Float[Array, "sample 3"] | None = None,
 ) -> Estimates:
     """`estimate_cloud` of the rows that `PoseModel.sample_rows` names, with normals of the first of them."""
-    return estimate_with_evidence(model, points, normals, mask, key=key)[0]
+    return estimate_with_evidence(model, points, normals, mask, key=key, eyes=eyes)[0]
 
 
 def estimate_with_evidence(
@@ -183,11 +186,13 @@ def estimate_with_evidence(
     mask: Bool[Array, "sample"],
     *,
     key: PRNGKeyArray,
+    eyes: Float[Array, "sample 3"] | None = None,
 ) -> tuple[Estimates, Evidence]:
     """`estimate_sample`, and what hypotheses of other views can be held against (`score_poses`)."""
     config = model.config
     _, pair_key, free_key = jax.random.split(key, 3)
-    cloud = normalised(points[: len(normals)], normals, mask[: len(normals)])
+    seen_from = None if eyes is None else eyes[: len(normals)]
+    cloud = normalised(points[: len(normals)], normals, mask[: len(normals)], seen_from)
     votes, log_extents = cast_votes(model, cloud, config.pairs, key=pair_key)
     first = canonicalised(vote(votes, config.symmetry, config.voting), cloud, config.symmetry)
     free = free_space(cloud, config.refinement, key=free_key)
@@ -219,7 +224,7 @@ def estimate_with_evidence(
     poses = poses[order]
     if config.symmetry.axial:
         poses = poses.at[0].set(
-            _with_refined_axis(poses[0], points, mask, cloud, config.revolution)
+            _with_refined_axis(poses[0], points, eyes, mask, cloud, config.revolution)
         )
     found = Estimates(
         poses=poses,
@@ -253,13 +258,18 @@ def estimate_batch(
     mask: Bool[Array, "b n"],
     *,
     key: PRNGKeyArray,
+    eyes: Float[Array, "b n 3"] | None = None,
 ) -> Estimates:
     """The estimates for every row of a batch, `at_once` at a time to bound the memory."""
     keys = jax.random.split(key, len(points))
-    rows = (jnp.asarray(points), jnp.asarray(normals), jnp.asarray(mask), keys)
+    rows = (*map(jnp.asarray, (points, normals, mask)), keys)
+    if eyes is not None:
+        rows = (*rows, jnp.asarray(eyes))
 
     def one(row: tuple[Array, ...]) -> Estimates:
-        return model.estimate(*row[:3], key=row[3])
+        points, normals, mask, own_key, *seen_from = row
+        several = {"eyes": seen_from[0]} if seen_from else {}
+        return model.estimate(points, normals, mask, key=own_key, **several)
 
     if len(points) <= model.at_once:
         return jax.vmap(one)(rows)
@@ -334,13 +344,15 @@ def cast_votes(
 def _with_refined_axis(
     pose: Float[Array, "4 4"],
     points: Float[Array, "sample 3"],
+    eyes: Float[Array, "sample 3"] | None,
     mask: Bool[Array, "sample"],
     cloud: Cloud,
     config: RevolutionConfig,
 ) -> Float[Array, "4 4"]:
     """The pose after `refined_axis`, in metres and the camera's frame."""
     within = (points - cloud.centre) / cloud.scale
-    views = -points / jnp.maximum(jnp.linalg.norm(points, axis=1, keepdims=True), 1e-6)
+    views = -points if eyes is None else eyes - points
+    views = views / jnp.maximum(jnp.linalg.norm(views, axis=1, keepdims=True), 1e-6)
     origin = (pose[:3, 3] - cloud.centre) / cloud.scale
     known = mask & (jnp.linalg.norm(within, axis=1) < STRAY)
     rotation, origin = refined_axis(

@@ -30,7 +30,9 @@ def choose_ambiguity_penalty(model: PoseModel, batches: Sequence[CloudBatch]) ->
     columns = []
     for index, batch in enumerate(batches):
         key = jax.random.key(index)
-        found = estimate_batch(model, batch.points, batch.normals, batch.mask, key=key)
+        found = estimate_batch(
+            model, batch.points, batch.normals, batch.mask, key=key, eyes=batch.eyes
+        )
         columns.append((hypothesis_degrees(found, batch), found.expected_error, found.ambiguous))
     degrees, expected_error, ambiguous = (
         np.concatenate(column) for column in zip(*columns, strict=True)

@@ -196,7 +196,8 @@ def evaluate(model: EstimatingModel, batches: Sequence[CloudBatch]) -> Row:
     rows = []
     for index, batch in enumerate(batches):
         key = jax.random.key(index)
-        found = estimate_batch(model, batch.points, batch.normals, batch.mask, key=key)
+        several = {"eyes": batch.eyes} if np.any(batch.eyes) else {}
+        found = estimate_batch(model, batch.points, batch.normals, batch.mask, key=key, **several)
         rows.append(jax.tree.map(np.asarray, _errors(found, batch)))
     degrees, metres, voted, confidence = (
         np.concatenate(column) for column in zip(*rows, strict=True)

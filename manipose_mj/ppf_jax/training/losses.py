@@ -84,7 +84,7 @@ def cloud_loss(
     keys = jax.random.split(key, 8)
     sample = stretched(sample, config.stretch, key=keys[6])
     sample = outlier_augmented(sample, config.outliers, key=keys[7])
-    cloud = normalised(sample.points, sample.normals, sample.mask)
+    cloud = normalised(sample.points, sample.normals, sample.mask, sample.eyes)
     rotation = sample.pose[:3, :3]
     origin = (sample.pose[:3, 3] - cloud.centre) / cloud.scale
     log_extents = jnp.log(sample.extents / cloud.scale)

@@ -60,10 +60,10 @@ def test_what_hides_a_target_goes_first_and_the_target_is_found_then(pile):
     first = next(candidate_moves(task.goals, estimate, planner)).steps()
     assert [step.primitive for step in first] == ["grasp_at", "move_to", "release"]
     assert first[0].subject in estimate.objects.keys() - {"object"}
-    perception.look_for_covered()
+    perception.look_around()
     assert perception.unseen == {"object"}
     covered.clear()
-    perception.look_for_covered()
+    perception.look_around()
     assert not perception.unseen and "object" in perception.observe().objects
 
 

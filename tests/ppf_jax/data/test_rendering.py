@@ -21,6 +21,7 @@ from manipose_mj.ppf_jax.data.rasteriser import Triangles, rasterise
 from manipose_mj.ppf_jax.data.rendering import Subject, render_clouds, render_view
 from manipose_mj.ppf_jax.data.view_cache import batch_stream, catalogue_clouds, catalogue_subject
 from manipose_mj.ppf_jax.data.view_settings import SETTINGS, ViewSetting, view_setting
+from manipose_mj.ppf_jax.points.cloud_files import read_clouds, write_clouds
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, LabelledCloud, batch_clouds
 from manipose_mj.storage.cache_root import CACHE_VARIABLE
 
@@ -81,7 +82,7 @@ def test_clean_points_lie_on_the_surface(mug):
     assert apart.max() < 2e-5
 
 
-@pytest.mark.parametrize("name", list(SETTINGS))
+@pytest.mark.parametrize("name", [n for n, s in SETTINGS.items() if s.cameras == (1, 1)])
 def test_points_are_near_the_object_and_normals_face_the_camera(mug, name):
     clouds = render_clouds(mug, SETTINGS[name], 4, np.random.default_rng(1))
     for each in clouds:
@@ -159,6 +160,42 @@ def test_a_lone_pixel_faces_the_camera():
     depth[4, 4] = 0.5
     normal = depth_normals(depth, depth > 0, np.array([[4, 4]]), camera)
     np.testing.assert_allclose(normal, [[0, 0, -1]], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["several", "several_tasks"])
+def test_what_several_cameras_see_is_one_cloud_of_points_seen_from_many_places(mug, name):
+    clouds = render_clouds(mug, view_setting(name), 6, np.random.default_rng(0))
+    again = render_clouds(mug, view_setting(name), 6, np.random.default_rng(0))
+    flat = mug.triangles.corners.reshape(-1, 3)
+    mesh = trimesh.Trimesh(flat, np.arange(len(flat)).reshape(-1, 3), process=False)
+    counts = []
+    for seen, same in zip(clouds, again, strict=True):
+        assert seen.eyes is not None and len(seen.eyes) == len(seen) <= 7 * MAX_POINTS // 4
+        np.testing.assert_array_equal(seen.points, same.points)
+        counts.append(len(np.unique(seen.eyes, axis=0)))
+        assert (np.sum(seen.normals * (seen.eyes - seen.points), axis=1) > 0).mean() > 0.99
+        in_mesh = transform(
+            mug.label.pose @ invert(seen.pose.astype(float)), seen.points.astype(float)
+        )
+        _, apart, _ = trimesh.proximity.closest_point(mesh, in_mesh[::8])
+        assert np.median(apart) < 0.004
+    assert max(counts) > 2
+
+
+def test_eyes_are_kept_in_files_and_batches(mug, tmp_path):
+    clouds = render_clouds(mug, view_setting("several"), 2, np.random.default_rng(0))
+    write_clouds(tmp_path / "mug_004.npz", clouds)
+    back = read_clouds(tmp_path / "mug_004.npz", "mug_004", "mug")
+    for seen, same in zip(clouds, back, strict=True):
+        np.testing.assert_array_equal(seen.eyes, same.eyes)
+    batch = batch_clouds(back, rng=np.random.default_rng(0), points=512)
+    rows = batch.mask[0]
+    assert len(np.unique(batch.eyes[0][rows], axis=0)) == len(np.unique(clouds[0].eyes, axis=0))
+    assert (
+        np.sum(batch.normals * (batch.eyes - batch.points), axis=2)[batch.mask] > 0
+    ).mean() > 0.99
+    one = batch_clouds([cloud(40, SymmetryGroup.identity())], rng=np.random.default_rng(0))
+    assert not one.eyes.any()
 
 
 def test_an_object_in_millimetres_is_named():

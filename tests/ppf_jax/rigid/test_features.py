@@ -48,6 +48,24 @@ def test_turning_the_scene_about_the_camera_changes_nothing(cloud, quaternion):
     assert np.allclose(turned[off_diagonal], _all_edges(*cloud)[off_diagonal], atol=2e-3)
 
 
+def test_points_are_seen_from_where_their_cameras_are(cloud):
+    points, normals, mask = cloud
+    one = normalised(points, normals, mask)
+    at_origin = normalised(points, normals, mask, np.zeros_like(points))
+    np.testing.assert_array_equal(one.views, at_origin.views)
+    eyes = np.where(np.arange(len(points))[:, None] % 2, 0.0, [1.0, 0.5, 0.2]).astype(np.float32)
+    several = normalised(points, normals, mask, eyes)
+    np.testing.assert_array_equal(several.points, one.points)
+    metric = np.asarray(several.points) * float(several.scale) + np.asarray(several.centre)
+    kept = np.asarray(several.mask)
+    off = [
+        np.linalg.norm(np.cross(several.views, eye - metric), axis=1)
+        for eye in (np.zeros(3), np.array([1.0, 0.5, 0.2]))
+    ]
+    assert (np.minimum(*off)[kept] < 1e-4).all()
+    assert 0 < (off[1] < 1e-4)[kept].mean() < 1
+
+
 def test_strays_of_the_background_are_left_out(cloud):
     points, normals, mask = (leaf.copy() for leaf in cloud)
     strays = [3, 17]

@@ -33,7 +33,7 @@ def outlier_augmented(sample: CloudBatch, most: float, *, key: PRNGKeyArray) -> 
     radius = _SPREAD * jnp.max(sample.extents) / 2
     reach = radius * jnp.cbrt(jax.random.uniform(reach_key, (count, 1)))
     points = jnp.where(moved[:, None], sample.pose[:3, 3] + reach * direction, sample.points)
-    away = jnp.sum(normals * points, axis=-1, keepdims=True) > 0
+    away = jnp.sum(normals * (points - sample.eyes), axis=-1, keepdims=True) > 0
     normals = jnp.where(away, -normals, normals)
     return replace(
         sample, points=points, normals=jnp.where(moved[:, None], normals, sample.normals)

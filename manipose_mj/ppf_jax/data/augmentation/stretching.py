@@ -43,6 +43,7 @@ def stretched(sample: CloudBatch, most: float, *, key: PRNGKeyArray) -> CloudBat
     return replace(
         sample,
         points=sample.points @ onto,
+        eyes=sample.eyes @ onto,
         normals=normals / jnp.maximum(lengths, 1e-9),
         pose=jnp.asarray(sample.pose).at[:3, 3].set(onto @ sample.pose[:3, 3]),
         extents=sample.extents * factors,

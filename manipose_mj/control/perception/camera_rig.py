@@ -1,0 +1,25 @@
+"""What an estimating agent looks through."""
+
+from __future__ import annotations
+
+from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
+
+CAMERAS = ("front", "left", "right")
+SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate uncertain
+# Behind the robot and over its shoulders: they see the front of furniture, and what leaves an estimate uncertain. The
+# first is the highest.
+_LOOKED_AT = (0.72, 0.0, 0.15)
+FRONT_VIEWS = (
+    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
+    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT),
+    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
+)
+FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
+# A depth camera's noise, at a third of its usual pixels.
+SENSORS = SensorConfig(
+    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS),
+    height=240,
+    width=320,
+    depth_model="structured_light",
+    renderer="ray",  # colours that do not depend on the machine; nobody but estimators of others looks
+)

@@ -1,0 +1,203 @@
+"""One object seen by several calibrated cameras, voted for by what all of them see: one cloud, one estimate.
+
+Networks that look from one point learn what is hidden from it, and are wrong about clouds of several. These have learnt
+such clouds, each point with the place of the camera that saw it. `MultiViewEstimator` asks networks of one view instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import numpy as np
+from jaxtyping import Float, PRNGKeyArray
+
+from manipose_mj.errors import InputError
+from manipose_mj.poses import invert, transform
+from manipose_mj.ppf_jax.confidence import Scores
+from manipose_mj.ppf_jax.estimator import (
+    LONGEST,
+    MIN_POINTS,
+    SHORTEST,
+    PoseEstimator,
+    filled,
+    scores_found,
+)
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
+from manipose_mj.ppf_jax.rigid.model import Estimates, PoseModel, estimate_sample
+
+VIEW_POINTS = 256  # of each camera, at most: as in training
+MIN_VIEW_POINTS = 8  # of a camera that counts: fewer have no normals worth the name
+
+_estimate_sample = jax.jit(estimate_sample)
+
+
+@dataclass(frozen=True)
+class FusedCloud:
+    """What several cameras see, in the frame of the one that sees most.
+
+    Attributes:
+      points: `(n, 3)` float32 [m].
+      normals: `(n, 3)` float32, unit, towards the camera that saw the point.
+      eyes: `(n, 3)` float32 [m], where that camera is.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+    eyes: Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True)
+class FusedViewEstimator:
+    """An estimator of what several cameras see.
+
+    Attributes:
+      networks: Trained on clouds of several cameras.
+    """
+
+    networks: PoseEstimator
+
+    @classmethod
+    def load(cls, name: str) -> FusedViewEstimator:
+        """The estimator of a category or of an object type, by the networks of its type.
+
+        Raises:
+          InputError: No such category or type.
+        """
+        return cls(PoseEstimator.load(name, cameras="several"))
+
+    def estimate(self, cloud: AnyCloud, *, key: PRNGKeyArray) -> PoseEstimate:
+        """The pose in the frame of one camera, by what that sees alone.
+
+        Raises:
+          InputError: The cloud cannot be used.
+        """
+        return self.estimate_views([cloud], np.eye(4)[None], key=key)
+
+    def estimate_views(
+        self,
+        clouds: Sequence[AnyCloud],
+        T_common_camera: Float[np.ndarray, "v 4 4"],
+        *,
+        key: PRNGKeyArray,
+    ) -> PoseEstimate:
+        """The pose of the object that all cameras see, in their common frame.
+
+        Args:
+          clouds: Of each camera, in its frame; those of fewer than `MIN_VIEW_POINTS` points do not count.
+          T_common_camera: `(v, 4, 4)`, of each camera [m].
+          key: Of all that is drawn.
+
+        Raises:
+          InputError: There is not one frame a cloud, a cloud cannot be used, all see too little together, or the
+            networks have learnt from single cameras.
+        """
+        rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).ravel())
+        cloud, T_common_camera = fused_cloud(clouds, T_common_camera, rng=rng)
+        found = self.estimate_fused(cloud, key=key)
+        others = tuple(_moved(each, T_common_camera) for each in found.hypotheses)
+        return replace(_moved(found, T_common_camera), hypotheses=others)
+
+    def estimate_many(
+        self, clouds: Sequence[FusedCloud | LabelledCloud], *, key: PRNGKeyArray
+    ) -> list[PoseEstimate]:
+        """`estimate_fused` of each; errors as there."""
+        keys = jax.random.split(key, len(clouds)) if clouds else ()
+        return [
+            self.estimate_fused(cloud, key=own) for cloud, own in zip(clouds, keys, strict=True)
+        ]
+
+    def estimate_fused(
+        self, cloud: FusedCloud | LabelledCloud, *, key: PRNGKeyArray
+    ) -> PoseEstimate:
+        """The pose of the object that a cloud of several cameras shows, in its frame.
+
+        Raises:
+          InputError: The networks have learnt from single cameras.
+        """
+        return self.networks.as_estimate(self._found(cloud, key=key))
+
+    def scores(
+        self, cloud: FusedCloud | LabelledCloud, *, key: PRNGKeyArray
+    ) -> tuple[Float[np.ndarray, "4 4"], Scores]:
+        """The pose that `estimate_fused` finds, and what its confidence is made of; errors as there."""
+        found = self._found(cloud, key=key)
+        return scores_found(self.networks, found)
+
+    def _found(self, cloud: FusedCloud | LabelledCloud, *, key: PRNGKeyArray) -> Estimates:
+        model = self.networks.trained.model
+        if not isinstance(model, PoseModel) or self.networks.trained.cameras != "several":
+            raise InputError(
+                "networks that have learnt from one camera; expected such as "
+                "PoseEstimator.load(name, cameras='several')"
+            )
+        rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).ravel())
+        rows = rng.permutation(len(cloud.points))[: model.config.sample]
+        points, mask = filled(cloud.points[rows], model.config.sample)
+        origins = np.zeros_like(cloud.points) if cloud.eyes is None else cloud.eyes
+        eyes, _ = filled(origins[rows], model.config.sample)
+        first = rows[: model.config.points]
+        normals, _ = filled(cloud.normals[first], model.config.points)
+        return _estimate_sample(model, points, normals, mask, key=key, eyes=eyes)
+
+
+def fused_cloud(
+    clouds: Sequence[AnyCloud],
+    T_common_camera: Float[np.ndarray, "v 4 4"],
+    *,
+    rng: np.random.Generator,
+) -> tuple[FusedCloud, Float[np.ndarray, "4 4"]]:
+    """What all cameras see as one cloud; arguments and errors are those of `estimate_views`.
+
+    Args:
+      clouds: Of each camera.
+      T_common_camera: Of each.
+      rng: Draws `VIEW_POINTS` of the points of a camera that sees more.
+
+    Returns:
+      The cloud, and its frame in the common one.
+    """
+    frames = np.asarray(T_common_camera, float)
+    if frames.shape != (len(clouds), 4, 4):
+        raise InputError(
+            f"{len(clouds)} clouds and camera frames of shape {frames.shape}; expected a 4x4 frame each"
+        )
+    seen = []
+    for cloud, frame in zip(clouds, frames, strict=True):
+        if len(cloud if isinstance(cloud, np.ndarray) else cloud.points) < MIN_VIEW_POINTS:
+            continue
+        points, normals = checked_cloud(
+            cloud, fewest=MIN_VIEW_POINTS, shortest=0.0, longest=LONGEST, what="an object"
+        )
+        kept = rng.permutation(len(points))[:VIEW_POINTS]
+        normals = cloud_normals(points, kept) if normals is None else normals[kept]
+        seen.append((points[kept], _towards(points[kept], normals), frame))
+    if not seen:
+        raise InputError(f"{len(clouds)} clouds, none of {MIN_VIEW_POINTS} points; expected one")
+    main = max(seen, key=lambda each: len(each[0]))[2]
+    points, normals, eyes = [], [], []
+    for own, towards, frame in seen:
+        across = np.eye(4) if frame is main else invert(main) @ frame
+        points.append(transform(across, own.astype(float)))
+        normals.append(towards @ across[:3, :3].T)
+        eyes.append(np.broadcast_to(across[:3, 3], own.shape))
+    rows = [np.concatenate(each).astype(np.float32) for each in (points, normals, eyes)]
+    checked_cloud(rows[0], fewest=MIN_POINTS, shortest=SHORTEST, longest=LONGEST, what="an object")
+    return FusedCloud(*rows), main
+
+
+def _towards(
+    points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 3"]:
+    """Unit normals towards the camera, at the origin."""
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    away = np.sum(normals * points, axis=1, keepdims=True) > 0
+    return np.where(away, -normals, normals)
+
+
+def _moved(estimate: PoseEstimate, T_common_camera: Float[np.ndarray, "4 4"]) -> PoseEstimate:
+    return replace(estimate, pose=T_common_camera @ estimate.pose.astype(float), hypotheses=())

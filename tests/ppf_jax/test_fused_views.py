@@ -1,0 +1,113 @@
+"""What several cameras see becomes one cloud in one frame, and one estimate in the cameras' common one."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+from manipose_mj.errors import InputError
+from manipose_mj.poses import SymmetryGroup, compose, invert, pose_error, rotation_about, transform
+from manipose_mj.ppf_jax.data.rendering import render_clouds
+from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, catalogue_subject
+from manipose_mj.ppf_jax.data.view_settings import view_setting
+from manipose_mj.ppf_jax.estimator import PoseEstimator
+from manipose_mj.ppf_jax.fused_views import FusedViewEstimator, fused_cloud
+
+KEY = jax.random.key(0)
+COMMON = compose(rotation_about(np.array([0.0, 0, 1]), 0.7), np.array([0.3, -0.2, 0.1]))
+FOLDER = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights" / "several"
+
+
+@pytest.fixture(scope="module")
+def views():
+    subject = catalogue_subject("cup", 4, resting=False)  # a test object
+    return render_clouds(subject, view_setting("anywhere"), 3, np.random.default_rng(1))
+
+
+@pytest.fixture(scope="module")
+def frames(views):
+    """Of the cameras, where the label's frame is `COMMON`."""
+    return np.stack([COMMON @ invert(view.pose.astype(float)) for view in views])
+
+
+def test_all_points_are_in_the_frame_of_the_camera_that_sees_most(views, frames):
+    cloud, T_common_camera = fused_cloud(views, frames, rng=np.random.default_rng(0))
+    assert len(cloud.points) == sum(min(len(view), 256) for view in views)
+    most = int(np.argmax([min(len(view), 256) for view in views]))
+    np.testing.assert_allclose(T_common_camera, frames[most])
+    # The cup's points, by its own label, whoever saw them.
+    local = transform(invert(COMMON) @ T_common_camera, cloud.points.astype(float))
+    for view in views:
+        seen = transform(invert(view.pose.astype(float)), view.points.astype(float))
+        nearest = np.linalg.norm(local[:, None] - seen, axis=2).min(axis=0)
+        assert np.median(nearest) < 0.005
+    eyes = transform(T_common_camera, np.unique(cloud.eyes, axis=0).astype(float))
+    assert sorted(map(tuple, eyes.round(4))) == sorted(map(tuple, frames[:, :3, 3].round(4)))
+    assert (np.sum(cloud.normals * (cloud.eyes - cloud.points), axis=1) > 0).all()
+
+
+def test_normals_are_found_where_none_are_given(views, frames):
+    given, _ = fused_cloud(views, frames, rng=np.random.default_rng(0))
+    points = [view.points for view in views]
+    found, _ = fused_cloud(points, frames, rng=np.random.default_rng(0))
+    np.testing.assert_array_equal(found.points, given.points)
+    assert np.median(np.sum(found.normals * given.normals, axis=1)) > 0.9
+
+
+@pytest.mark.full
+def test_three_views_give_the_pose_in_the_common_frame(views, frames):
+    estimator = FusedViewEstimator.load("cup")
+    found = estimator.estimate_views(views, frames, key=KEY)
+    shift, turn = pose_error(found.pose, COMMON, SymmetryGroup.about_x())
+    assert shift < 0.01 and turn < np.deg2rad(3.0)
+    assert found.confidence > 0.9
+    np.testing.assert_allclose(found.extents[0], views[0].extents[0], rtol=0.1)
+    again = estimator.estimate_views(views, frames, key=KEY)
+    np.testing.assert_array_equal(again.pose, found.pose)
+    one = estimator.estimate(views[0], key=KEY)
+    shift, turn = pose_error(one.pose, views[0].pose.astype(float), SymmetryGroup.about_x())
+    assert shift < 0.01 and turn < np.deg2rad(3.0)
+
+
+def test_what_cannot_be_fused_is_told(views, frames):
+    estimator = FusedViewEstimator.load("cup")
+    with pytest.raises(InputError, match="3 clouds and camera frames of shape"):
+        estimator.estimate_views(views, frames[:1], key=KEY)
+    with pytest.raises(InputError, match="none of 8 points"):
+        estimator.estimate_views([view.points[:7] for view in views], frames, key=KEY)
+    with pytest.raises(InputError, match="cloud of 30 points; expected at least 32"):
+        estimator.estimate_views([view.points[:10] for view in views], frames, key=KEY)
+    with pytest.raises(InputError, match="learnt from one camera"):
+        FusedViewEstimator(PoseEstimator.load("cup")).estimate_views(views, frames, key=KEY)
+
+
+@pytest.mark.parametrize("object_type", ["axial", "mirror", "functional"])
+def test_weights_are_those_of_the_type_and_say_what_they_learnt_from(object_type):
+    path = FOLDER / f"{object_type}.npz"
+    assert path.stat().st_size < 2e6
+    estimator = PoseEstimator.load(object_type, cameras="several")
+    assert estimator.trained.cameras == "several" and estimator.calibration is not None
+    assert PoseEstimator.load(object_type).trained.cameras == "one"
+    for category in estimator.trained.categories:
+        assert PoseEstimator.load(category, cameras="several").trained is estimator.trained
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("category", "deg", "flipped"), [("can", 0.64, 1), ("camera", 1.9, 2), ("spatula", 1.04, 0)]
+)
+def test_shipped_weights_reproduce_a_published_figure(category, deg, flipped):
+    """As docs/experiments/fused_views.md has it, 40 test clouds each."""
+    clouds = catalogue_clouds(category, "test", view_setting("several"), views=4, jobs=1)
+    estimator = FusedViewEstimator.load(category)
+    turns = []
+    for number, cloud in enumerate(clouds):
+        found = estimator.estimate_fused(cloud, key=jax.random.key(number))
+        turns.append(pose_error(found.pose.astype(float), cloud.pose, cloud.symmetry)[1])
+    assert len(clouds) == 40
+    assert np.degrees(np.median(turns)) == pytest.approx(deg, abs=0.15)
+    assert np.sum(np.degrees(turns) > 90) == pytest.approx(flipped, abs=1)
