@@ -16,9 +16,6 @@ from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.camera_rig import SENSORS
 from manipose_mj.control.perception.estimated import EstimatedPerception, EstimatedPose
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
-from manipose_mj.control.perception.objects.shape_fits import KnownShapes
-from manipose_mj.control.perception.pose_sensing import sense_pose
-from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.control.planning.plan import plan_to_json
 from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.errors import InputError
@@ -30,59 +27,13 @@ from manipose_mj.mjcf.objects import RigidObject
 from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.ppf_jax import estimator
 from manipose_mj.ppf_jax.estimator import PoseEstimate
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
-
-TARGET_POSE = "single_object/target_pose"
-CUP = "cup_004"  # a test object: no training saw it, nor is it a known shape
-
-
-class Recalled:
-    """An estimator that answers with what it was told, whatever it sees."""
-
-    def __init__(
-        self, pose_world: np.ndarray, extents: np.ndarray, confidence: float = 1.0
-    ) -> None:
-        self.pose_world, self.extents, self.confidence = pose_world, extents, confidence
-        self.asked = 0
-
-    def estimate(self, cloud: Any, *, key: Any) -> PoseEstimate:
-        self.asked += 1
-        pose = invert(cloud.T_world_camera) @ self.pose_world
-        return PoseEstimate(pose, self.extents, self.confidence)
-
-
-def _config(name: str) -> EnvConfig:
-    return EnvConfig(
-        TARGET_POSE, obs_mode="state", objects=(name,), sensors=sensors_for("estimated")
-    )
-
-
-@pytest.fixture(scope="module")
-def cup():
-    """An environment with a cup that a camera sees."""
-    environment = suite.make(_config(CUP))
-    environment.reset()
-    return environment
-
-
-@pytest.fixture
-def truth(cup):
-    """The environment at the start of an episode, and the label's pose and lengths there."""
-    cup.random_state.seed(1)
-    cup.reset()
-    obj = cup.task.object
-    return obj.label_pose(cup.physics), np.array(obj.asset.label.extents)
-
-
-def _perception(environment, estimator) -> EstimatedPerception:
-    return EstimatedPerception(
-        environment.task, environment.physics, estimators=lambda _: estimator
-    )
+from manipose_mj.tasks.core.config import EpisodeSpec
+from tests.control.perception.recalled import CUP, TARGET_POSE, Recalled, config_of, perception_of
 
 
 def _plan_and_pick(environment, estimator) -> tuple[str, np.ndarray, np.ndarray]:
     baseline = Baseline(environment, "estimated")
-    perception = _perception(environment, estimator)
+    perception = perception_of(environment, estimator)
     baseline._compiled = replace(baseline._compiled, perception=perception)
     perception.reset(0)
     estimate = perception.observe()
@@ -120,7 +71,7 @@ def test_the_true_perception_does_see_what_the_others_must_not(cup, truth, monke
 
 
 def test_the_planning_scene_holds_nothing_of_the_object(cup, truth):
-    perception = _perception(cup, Recalled(*truth))
+    perception = perception_of(cup, Recalled(*truth))
     perception.reset(0)
     estimate = perception.observe()
     scene = estimate.scene
@@ -138,7 +89,7 @@ def test_the_planning_scene_holds_nothing_of_the_object(cup, truth):
 def test_an_estimate_is_kept_while_it_fits_and_re_estimated_when_it_does_not(cup, truth):
     pose, extents = truth
     estimator = Recalled(pose, extents)
-    perception = _perception(cup, estimator)
+    perception = perception_of(cup, estimator)
     perception.reset(0)
     asked = estimator.asked
     cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
@@ -161,7 +112,7 @@ def test_an_uncertain_estimate_gives_way_to_a_surer_one_that_fits_as_well(
 ):
     pose, extents = truth
     estimator = Recalled(pose, extents, confidence=0.1)
-    perception = _perception(cup, estimator)
+    perception = perception_of(cup, estimator)
     perception.reset(0)
     nearby = np.array(pose)
     nearby[:3, 3] += [0.0, 0.0, 0.0005]
@@ -172,7 +123,7 @@ def test_an_uncertain_estimate_gives_way_to_a_surer_one_that_fits_as_well(
 
 
 def test_what_is_held_follows_the_hand(cup, truth):
-    perception = _perception(cup, Recalled(*truth))
+    perception = perception_of(cup, Recalled(*truth))
     perception.reset(0)
     before = perception.observe()
     perception.hold("object")
@@ -188,7 +139,7 @@ def test_what_is_held_follows_the_hand(cup, truth):
 def test_what_fingers_are_around_does_not_jump_but_what_they_lose_may(cup, truth):
     pose, extents = truth
     estimator = Recalled(pose, extents)
-    perception = _perception(cup, estimator)
+    perception = perception_of(cup, estimator)
     perception.reset(0)
     joints, opening = cup.task.robot.configuration(cup.physics)
     perception.hold("object")
@@ -209,84 +160,9 @@ def test_what_fingers_are_around_does_not_jump_but_what_they_lose_may(cup, truth
 
 def test_low_confidence_brings_in_another_camera(cup, truth):
     sure, unsure = Recalled(*truth), Recalled(*truth, confidence=0.2)
-    _perception(cup, sure).reset(0)
-    _perception(cup, unsure).reset(0)
+    perception_of(cup, sure).reset(0)
+    perception_of(cup, unsure).reset(0)
     assert unsure.asked > sure.asked + 3
-
-
-class OfViews(Recalled):
-    """Is asked once about all views."""
-
-    def estimate_views(self, clouds: Any, T_common_camera: np.ndarray, *, key: Any) -> PoseEstimate:
-        self.asked += 1
-        self.cameras = tuple(cloud.camera for cloud in clouds)
-        np.testing.assert_array_equal(T_common_camera, [cloud.T_world_camera for cloud in clouds])
-        return PoseEstimate(self.pose_world, self.extents, self.confidence)
-
-
-@pytest.mark.parametrize(("confidence", "asked"), [(1.0, 1), (0.2, 2)])
-def test_an_estimator_of_views_is_asked_once_a_look(cup, truth, confidence, asked):
-    estimator = OfViews(*truth, confidence=confidence)
-    perception = _perception(cup, estimator)
-    perception.reset(0)
-    assert estimator.asked == asked
-    assert len(estimator.cameras) > (3 if asked == 2 else 1)
-    known = perception._known["object"]
-    np.testing.assert_allclose(known.pose, truth[0], atol=1e-9)
-    assert known.camera.split("+")[0] == "front"
-
-
-@pytest.mark.parametrize(
-    ("first", "then", "replaced"), [(0.5, 0.9, True), (0.5, 0.4, False), (0.7, 0.9, False)]
-)
-def test_between_plans_what_is_uncertain_is_looked_at_anew(cup, truth, first, then, replaced):
-    pose, extents = truth
-    wrong = pose @ compose(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
-    estimator = OfViews(wrong, 1.2 * extents, confidence=first)
-    perception = _perception(cup, estimator)
-    perception.reset(0)
-    grasps = perception._grasps["object"]
-    asked = estimator.asked
-    perception.look_around()  # nothing has happened since
-    assert estimator.asked == asked
-    cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
-    # Of another shape, which the old one would not fit.
-    estimator.pose_world, estimator.extents, estimator.confidence = pose, extents, then
-    perception.look_around()
-    obj = perception.observe().objects["object"]
-    np.testing.assert_allclose(obj.label_pose, pose if replaced else wrong, atol=1e-9)
-    np.testing.assert_allclose(obj.label.extents, extents if replaced else 1.2 * extents)
-    assert (perception._grasps["object"] is not grasps) == replaced
-
-
-@pytest.mark.parametrize(("known_by", "anew"), [(0.4, True), (0.9, False)])
-def test_a_shape_found_by_few_points_is_found_anew(cup, truth, known_by, anew):
-    pose, extents = truth
-    estimator = OfViews(pose, 1.2 * extents, confidence=0.9)
-    perception = _perception(cup, estimator)
-    perception.reset(0)
-    known = perception._known["object"]
-    perception._known["object"] = replace(known, points=int(known_by * known.points))
-    cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
-    estimator.extents, estimator.confidence = extents, 0.8
-    perception.look_around()
-    label = perception.observe().objects["object"].label
-    np.testing.assert_allclose(label.extents, extents if anew else 1.2 * extents)
-
-
-@pytest.mark.parametrize(("counts", "seen"), [((40, 7, 0), True), ((25, 7, 7), False)])
-def test_slivers_do_not_count_among_views(cup, truth, counts, seen):
-    perception = _perception(cup, OfViews(*truth))
-    views = perception._views.of(cup.physics, "object")
-    few = [
-        replace(view, points=view.points[:n], normals=view.normals[:n])
-        for view, n in zip(views, counts, strict=True)
-    ]
-    estimator = OfViews(*truth)
-    sensed = sense_pose(estimator, few, KnownShapes(known_shapes("cup")), lambda: None)
-    assert (sensed is not None) == seen
-    if sensed is not None:
-        assert estimator.cameras == (views[0].camera,)
 
 
 class Wavering(Recalled):
@@ -310,7 +186,7 @@ def test_a_second_look_replaces_what_it_contradicts(cup, truth, agrees):
         other[:3, 3] += [0.004, 0.0, 0.0]
     else:
         other[:3, :2] *= -1.0
-    perception = _perception(cup, Wavering(pose, other, extents))
+    perception = perception_of(cup, Wavering(pose, other, extents))
     perception.reset(0)
     known = perception._known["object"]
     np.testing.assert_allclose(known.pose, pose if agrees else other, atol=1e-6)
@@ -321,14 +197,14 @@ def test_what_no_camera_sees_fails_in_perception(cup, truth):
     cup.task.object.place(cup.physics, compose(np.eye(3), np.array([0.5, 0.0, 30.0])))
     cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
     with pytest.raises(StageFailure, match="no camera sees enough of object") as failure:
-        _perception(cup, Recalled(*truth)).reset(0)
+        perception_of(cup, Recalled(*truth)).reset(0)
     assert failure.value.stage == "perception"
 
 
 def test_a_category_without_weights_is_told_in_one_line(monkeypatch, tmp_path):
     monkeypatch.setattr(estimator.resources, "files", lambda _: tmp_path)
     with pytest.raises(InputError, match="no weights for remote") as error:
-        episode.run_episode(_config("remote_000"), EpisodeSpec(0), pose="estimated")
+        episode.run_episode(config_of("remote_000"), EpisodeSpec(0), pose="estimated")
     assert "\n" not in str(error.value)
 
 
@@ -382,7 +258,7 @@ def test_true_poses_have_no_estimate_errors(cup, truth):
 
 @pytest.mark.full
 def test_a_cup_is_stored_at_its_goal_by_estimates_alone():
-    result, _ = episode.run_episode(_config(CUP), EpisodeSpec(1), pose="estimated")
+    result, _ = episode.run_episode(config_of(CUP), EpisodeSpec(1), pose="estimated")
     assert result.success_at_end, result.reason
     assert result.pose_source == "estimated"
     assert result.estimate_translation_error is not None
