@@ -5,7 +5,7 @@
 Starts are those of protocol v1, with other seeds if `--resample` says so. Every object that perception sees counts, goal or
 not. `--networks one` estimates each camera's cloud by itself and lets the shapes of known objects choose among the
 hypotheses; `several` fuses the clouds first. Right is within 15 deg and 2 cm, flipped beyond 90 deg. Seconds are those of
-looking at a start for the first time, all objects and furniture included.
+making a start and looking at it for the first time. Furniture is the simulator's.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def main() -> None:
     )
     for name, rows in by_name.items():
         print(line(name, rows))
-    print(f"{np.median(seconds):.1f} s a start, settling included")
+    print(f"{np.median(seconds):.1f} s a start")
 
 
 if __name__ == "__main__":

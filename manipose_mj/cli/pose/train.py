@@ -57,7 +57,7 @@ def train_pose(
       setting: From where objects are seen, one or several: training, anywhere, resting, tasks, clean, occluded.
       views: Of each object in each setting.
       part_swaps: Of a type, so many objects besides that are made of two of different categories, 32 views
-        each in the setting several if that is among the settings, else in training.
+        each in the setting several if a setting has several cameras, else in training.
       assets: Folders of built assets, such as your scans, that are trained on besides: those of the category or
         type.
       asset_views: Of each of these assets in each setting.
@@ -83,6 +83,7 @@ def train_pose(
     from manipose_mj.cli.pose.clouds import PoseClouds
     from manipose_mj.console import output
     from manipose_mj.ppf_jax.data.view_cache import batch_stream
+    from manipose_mj.ppf_jax.data.view_settings import view_setting
     from manipose_mj.ppf_jax.points.symmetry import common_symmetry
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, train
@@ -90,8 +91,8 @@ def train_pose(
     from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
 
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
-    several = next((each for each in setting if each == SEVERAL), "training")
-    made_of_two = source.part_swapped(part_swaps, several)
+    several = any(view_setting(each).cameras != (1, 1) for each in setting)
+    made_of_two = source.part_swapped(part_swaps, SEVERAL if several else "training")
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
     clouds += made_of_two
     known = common_symmetry(cloud.symmetry for cloud in clouds)
@@ -105,7 +106,7 @@ def train_pose(
     checks = -(-chosen.checks // batch)
     held_out = source.rendered(
         "test",
-        SEVERAL if several == SEVERAL else HELD_OUT,
+        SEVERAL if several else HELD_OUT,
         1 + checks * batch // source.objects("test"),
     )
     config = chosen.configured(clouds)
@@ -131,7 +132,7 @@ def train_pose(
         )
     if chosen.tuned is not None:
         model = chosen.tuned(model, list(islice(feed(0), checks)))
-    cameras = "several" if several == SEVERAL else "one"
+    cameras = "several" if several else "one"
     save_weights(folder / WEIGHTS_FILE, TrainedModel(model, source.categories, labels, cameras))
     draw_curve(folder / CURVE_FILE, folder / CURVE_PICTURE)
     output.standard_output().print(
