@@ -41,9 +41,8 @@ def fitted(records: Sequence[Record], weights: Float[np.ndarray, "n"]) -> Calibr
     share = weights / weights.sum()
     mean = share @ features
     scale = np.sqrt(share @ (features - mean) ** 2)
-    scale = np.where(
-        scale < 1e-4, 1.0, scale
-    )  # of what all estimates have in common, such as one cloud
+    # What all estimates have in common, such as one cloud, has no scale.
+    scale = np.where(scale < 1e-4, 1.0, scale)
     scaled = np.column_stack([(features - mean) / scale, np.ones(len(records))])
     kept = np.append(np.full(features.shape[1], RIDGE), 0.0)
 
