@@ -13,7 +13,7 @@ from manipose_mj.assets.gripper import ParallelJaw
 from manipose_mj.grasp_sampling.antipodal import FRICTION, MIN_WIDTH
 from manipose_mj.grasp_sampling.approaches import DEPTH, PairFrames
 from manipose_mj.grasp_sampling.contact_patch import contact_patch, pad_reach
-from manipose_mj.grasp_sampling.gripper_clearance import finger_cells, finger_reach, fingers_free
+from manipose_mj.grasp_sampling.gripper_clearance import finger_reach, fingers_free
 from manipose_mj.grasp_sampling.touch_points import SurfacePoints
 
 MIN_COVER = 0.1  # least share of a pad that must touch
@@ -86,8 +86,7 @@ def fit_pairs(
     normals = cloud.touch.normals.T.astype(np.float32)
     reach = max(finger_reach(gripper), pad_reach(gripper))
     longest = 2 * gripper.clearance + max(high[1] for _, high in gripper.finger)
-    fits: list[_PairFit] = []
-    pictures = []
+    found = []
     offset = cloud.mass_properties.center_of_mass - frames.center
     levers = np.linalg.norm(np.cross(offset, frames.axes[:, 1]), axis=1)
     for pair in range(len(frames)):
@@ -107,12 +106,9 @@ def fit_pairs(
             gripper,
         )
         if fit is not None:
-            fits.append(fit)
-            pictures.append(finger_cells(local, fit.faces, gripper))
-    clear = fingers_free(np.array(pictures), gripper) if fits else []
-    return Candidates.joined(
-        [f.candidates.take(mine[f.hands]) for f, mine in zip(fits, clear, strict=True)]
-    )
+            clear = fingers_free(local, fit.faces, gripper)
+            found.append(fit.candidates.take(clear[fit.hands]))
+    return Candidates.joined(found)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
 """Does the open hand, on its straight way in, meet the object?
 
 Seen along the closing direction, each of the hand's boxes is a rectangle, and its way in a longer one.
-The object's points at the height of the box are drawn into a picture of square cells about the pair,
-and how many of them a hand covers is the product of the picture with the hand's mask: one matrix
-product for every turn and depth of every pair.
+A grid of square cells about the pair says of each cell which hands' rectangles cover it, a bit for each
+turn and depth. The hands that an object's points meet are the bits of their cells, joined.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt64
 
 from manipose_mj.assets.gripper import ParallelJaw
 from manipose_mj.grasp_sampling.approaches import COS, DEPTH, DEPTHS, HANDS, SIN, PairFrames
@@ -20,11 +19,12 @@ from manipose_mj.grasp_sampling.approaches import COS, DEPTH, DEPTHS, HANDS, SIN
 STANDOFF = 0.10  # where the straight approach starts [m]
 MARGIN = 0.0015  # kept between the open fingers and the object's points [m]
 COARSE_MARGIN = 0.003  # and between the hand's large boxes and fewer points [m]
-_CELL = 0.0015  # of the fingers' pictures [m]
+_CELL = 0.0015  # of the fingers' grids [m]
 _COARSE_CELL = 0.004  # of the hand's [m]
-_STEP = 0.03  # the hand's pictures are as large as the object, to the next multiple of this [m]
+_STEP = 0.03  # the hand's grids are as large as the object, to the next multiple of this [m]
 _BAND = 0.01  # the hand's boxes reach to a multiple of this along the closing direction [m]
-_BLOCK = 64  # pairs whose pictures are held at a time
+_BLOCK = 64  # pairs whose points are held at a time
+_BITS = np.uint64(1) << np.arange(HANDS, dtype=np.uint64)
 
 
 @dataclass(frozen=True)
@@ -34,25 +34,25 @@ class _Masks:
     Attributes:
       bands: `(b, 2)` [m], from where to where; the fingers' from the pad's face, the hand's from the
         middle. The fingers' overlap.
-      cells: `(b, cells, hands)`, one where covered.
-      size: Cells along one side of the square picture.
+      covered: `(b, cells)`, of each cell the bits of the hands that cover it.
+      size: Cells along one side of the square grid.
       cell: [m].
     """
 
     bands: Float[np.ndarray, "b 2"]
-    cells: Float[np.ndarray, "b cells hands"]
+    covered: UInt64[np.ndarray, "b cells"]
     size: int
     cell: float
 
     @property
     def radius(self) -> float:
-        """Half the side of the picture [m]."""
+        """Half the side of the grid [m]."""
         return self.size * self.cell / 2
 
     def index(
         self, first: Float[np.ndarray, "*n"], other: Float[np.ndarray, "*n"]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The cell of each point, and whether it lies in the picture at all."""
+        """The cell of each point, and whether it lies in the grid at all."""
         row = np.floor(first / self.cell + self.size / 2).astype(np.int32)
         column = np.floor(other / self.cell + self.size / 2).astype(np.int32)
         inside = (np.minimum(row, column) >= 0) & (np.maximum(row, column) < self.size)
@@ -74,31 +74,28 @@ def hand_free(
     points = coarse.T.astype(np.float32)
     free = np.ones((len(frames), HANDS), bool)
     for start in range(0, len(frames), _BLOCK):
-        count = min(_BLOCK, len(frames) - start)
-        local = frames.local(slice(start, start + count), points)
+        local = frames.local(slice(start, start + _BLOCK), points)
         cell, inside = masks.index(local[0], local[2])
-        cell += np.arange(count, dtype=np.int32)[:, None] * masks.size**2
         away = np.abs(local[1]) - COARSE_MARGIN
-        met = np.zeros((count, HANDS), np.float32)
-        for (low, high), mask in zip(masks.bands, masks.cells, strict=True):
-            picture = np.zeros((count, masks.size**2), np.float32)
-            picture.ravel()[cell[inside & (away >= low) & (away < high)]] = 1
-            met += picture @ mask
-        free[start : start + count] = met < 0.5
+        met = np.zeros(local.shape[1], np.uint64)
+        for (low, high), covered in zip(masks.bands, masks.covered, strict=True):
+            pair, point = np.nonzero(inside & (away >= low) & (away < high))
+            np.bitwise_or.at(met, pair, covered[cell[pair, point]])
+        free[start : start + _BLOCK] = _not_in(met)
     return free
 
 
-def finger_cells(
+def fingers_free(
     local: Float[np.ndarray, "3 m"],
     faces: Float[np.ndarray, "n 2"],
     gripper: ParallelJaw,
-) -> Float[np.ndarray, "b cells"]:
-    """The pictures of the points at the height of the fingers of one pair, one for each band.
+) -> Bool[np.ndarray, "hands"]:
+    """Whether the open fingers, of each hand at one pair, meet no point.
 
     Args:
       local: Points in the pair's frame [m].
       faces: `(n, 2)` [m], where the open pads' faces are along the closing direction, for each of
-        the hands; the pictures hold for all of them.
+        some hands; the answer holds for all of these.
       gripper: The hand.
     """
     masks = _finger_masks(gripper)
@@ -106,24 +103,20 @@ def finger_cells(
     # Beyond either pad's face, the nearest and the farthest; negative between them.
     beyond = np.maximum(local[1] - faces[:, 1].min(), faces[:, 0].max() - local[1])
     outside = np.maximum(local[1] - faces[:, 1].max(), faces[:, 0].min() - local[1])
-    pictures = np.zeros((len(masks.bands), masks.size**2), np.float32)
-    for picture, (low, high) in zip(pictures, masks.bands, strict=True):
-        picture[cell[inside & (beyond > low - MARGIN) & (outside < high + MARGIN)]] = 1
-    return pictures
+    met = np.uint64(0)
+    for (low, high), covered in zip(masks.bands, masks.covered, strict=True):
+        near = inside & (beyond > low - MARGIN) & (outside < high + MARGIN)
+        met |= np.bitwise_or.reduce(covered[cell[near]])
+    return _not_in(met)
 
 
-def fingers_free(
-    pictures: Float[np.ndarray, "p b cells"], gripper: ParallelJaw
-) -> Bool[np.ndarray, "p hands"]:
-    """Whether the open fingers meet no point of these pictures."""
-    met = np.zeros((len(pictures), HANDS), np.float32)
-    for band, mask in enumerate(_finger_masks(gripper).cells):
-        met += pictures[:, band] @ mask
-    return met < 0.5
+def _not_in(met: UInt64[np.ndarray, "*n"] | np.uint64) -> Bool[np.ndarray, "*n hands"]:
+    """Of each hand whether its bit is not set."""
+    return (np.asarray(met)[..., None] & _BITS) == 0
 
 
 def finger_reach(gripper: ParallelJaw) -> float:
-    """Half the side of the fingers' pictures [m]."""
+    """Half the side of the fingers' grids [m]."""
     return _finger_masks(gripper).radius
 
 
@@ -175,9 +168,9 @@ def _masks(
     first, other = np.repeat(at, size)[:, None], np.tile(at, size)[:, None]
     x = COS * other - SIN * first
     z = COS * first + SIN * other + DEPTH
-    cells = np.zeros((len(bands), size**2, HANDS), np.float32)
-    for mask, band in zip(cells, rectangles, strict=True):
+    covered = np.zeros((len(bands), size**2), np.uint64)
+    for bits, band in zip(covered, rectangles, strict=True):
         for width, low, high in band:
-            covered = (np.abs(x) < width + margin) & (z > low - margin) & (z < high + margin)
-            mask[covered] = 1
-    return _Masks(bands, cells, size, cell)
+            inside = (np.abs(x) < width + margin) & (z > low - margin) & (z < high + margin)
+            bits |= np.where(inside, _BITS, np.uint64(0)).sum(axis=1, dtype=np.uint64)
+    return _Masks(bands, covered, size, cell)
