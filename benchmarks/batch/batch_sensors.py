@@ -26,6 +26,7 @@ from manipose_mj.batch.perception.cameras import Cameras
 from manipose_mj.batch.perception.clouds import noisy_images, object_clouds
 from manipose_mj.batch.perception.reaching import estimate_and_choose, grasp_table
 from manipose_mj.batch.starts import StartPool
+from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.ppf_jax.estimator import PoseEstimator
@@ -49,6 +50,7 @@ def main() -> None:
     parser.add_argument("--rgb", action="store_true", help="colours too")
     parser.add_argument("--blind", action="store_true", help="no estimates: look and clouds alone")
     arguments = parser.parse_args()
+    compile_at_once_on_gpus()
     print(f"{machine()}; {jax.devices()[0].device_kind}, JAX {jax.__version__}")
     pool = _pool(arguments)
     worlds = batch.from_pool(pool, arguments.worlds, arguments.engine, visual=True)
