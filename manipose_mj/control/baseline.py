@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -11,7 +11,9 @@ import mujoco
 import numpy as np
 from dm_control import composer
 
+from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.control.execution.executor import Action, Executor
+from manipose_mj.control.execution.looking import way_to_look_into
 from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.execution.recovery import let_go_safely
 from manipose_mj.control.motion.arm_model import ArmModel
@@ -31,6 +33,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.goals import TakenOutGoal
 from manipose_mj.tasks.instructions.sentence import instruction
 
 # Plans an episode may try, and stages whose failure another plan may mend.
@@ -202,7 +205,7 @@ class Baseline:
                 hidden = parts_to_look_behind(task.goals, estimate)
                 if len(steps) < len(plan) or (looks > 0 and hidden):
                     looks -= 1
-                    scene.perception.look_again()
+                    yield from self._look_behind(hidden, planner, executor)
                     progress.made()
                 elif not (step_by_step and plan):
                     self.status = "done"
@@ -271,6 +274,24 @@ class Baseline:
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()
+
+    def _look_behind(
+        self, parts: Sequence[str], planner: MotionPlanner, executor: Executor
+    ) -> Iterator[Action]:
+        """Measure what was opened, and look through the hand's camera into what hides an object that a goal is about."""
+        perception, goals = self.perception, self._environment.task.goals
+        perception.look_again()
+        hiding = {goal.part for goal in goals if isinstance(goal, TakenOutGoal)}
+        for name in sorted(hiding.intersection(parts)) if perception.looks_by_hand else ():
+            self.status = f"look into {name}"
+            estimate = executor.observe()
+            way = way_to_look_into(planner.within(estimate.scene), estimate, estimate.parts[name])
+            if way is not None:
+                yield from executor.follow(way)
+                yield from executor.open_to(MAX_OPENING)
+                perception.look_closely()
+        for name in sorted(perception.unseen):
+            raise StageFailure("perception", f"no camera sees enough of {name}, opened or not")
 
     def _recover(
         self,

@@ -6,8 +6,9 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.perception.estimated import EstimatedPerception, EstimatedPose
+from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.perturbed import PerturbedPerception
+from manipose_mj.control.perception.pose_sensing import EstimatedPose
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import pose_error
 from manipose_mj.tasks.core.task import ManipulationTask

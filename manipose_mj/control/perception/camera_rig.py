@@ -15,11 +15,18 @@ FRONT_VIEWS = (
     CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
 )
 FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
+HAND_CAMERA = "panda/wrist"  # looks where the hand is brought to look, nowhere else
 # A depth camera's noise, at a third of its usual pixels.
 SENSORS = SensorConfig(
-    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS),
+    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS, HAND_CAMERA),
     height=240,
     width=320,
     depth_model="structured_light",
     renderer="ray",  # colours that do not depend on the machine; nobody but estimators of others looks
 )
+
+
+def standing_cameras(sensors: SensorConfig) -> tuple[str, ...]:
+    """The names of those that do not move, in their order; where there are none, of all."""
+    names = sensors.camera_names
+    return tuple(name for name in names if name != HAND_CAMERA) or names

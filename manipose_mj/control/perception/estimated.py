@@ -9,7 +9,7 @@ Furniture and surroundings are a `World`'s.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -18,7 +18,12 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
-from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SPARE_CAMERAS
+from manipose_mj.control.perception.camera_rig import (
+    FRONT_CAMERAS,
+    HAND_CAMERA,
+    SPARE_CAMERAS,
+    standing_cameras,
+)
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
@@ -27,9 +32,11 @@ from manipose_mj.control.perception.objects.object_views import ObjectView, Obje
 from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.pose_sensing import (
     MIN_VIEW_POINTS,
+    EstimatedPose,
     Estimator,
     EstimatorOfViews,
     SensedPose,
+    agree,
     random_keys,
     sense_pose,
     weighed,
@@ -40,7 +47,7 @@ from manipose_mj.control.scene.collision_model import subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.poses import invert, pose_error, transform
+from manipose_mj.poses import invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import OnTableGoal, PoseGoal, TakenOutGoal
 
@@ -54,19 +61,6 @@ _BETTER = 0.9  # of what is left of the weighed misfit, for another pose to repl
 # they lose it: [m], and as a share of its width.
 _IN_HAND = (0.03, 0.5)
 _LOST, _LOST_SHARE = 0.004, 0.5
-
-
-@dataclass(frozen=True)
-class EstimatedPose:
-    """The pose of an object at the last observation, for reports.
-
-    Attributes: name; pose `T_world_label`; confidence: when it was estimated; camera: that saw it.
-    """
-
-    name: str
-    pose: Float[np.ndarray, "4 4"]
-    confidence: float
-    camera: str
 
 
 class EstimatedPerception:
@@ -100,11 +94,14 @@ class EstimatedPerception:
         self._world = world or SimulatedWorld(task, physics)
         self.feels_joints = self._world.feels_joints
         self._grasp_source: GraspSource = grasps
-        names = task.env_config.sensors.camera_names
+        sensors = task.env_config.sensors
+        names = standing_cameras(sensors)
         every = tuple(name for name in names if name not in FRONT_CAMERAS) or names
         usual = tuple(name for name in every if name not in SPARE_CAMERAS) or every
         self._views = ObjectViews(task.task_observables, usual)
         self._more_views = ObjectViews(task.task_observables, names)
+        self.looks_by_hand = HAND_CAMERA in sensors.camera_names
+        self._close_views = ObjectViews(task.task_observables, sensors.camera_names)
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, Callable[[], GraspSet]] = {}
         self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
@@ -151,8 +148,12 @@ class EstimatedPerception:
     @property
     def _covered(self) -> frozenset[str]:
         """Those of them that no furniture hides."""
-        goals = self._task.goals
-        return self.unseen - {goal.object for goal in goals if isinstance(goal, TakenOutGoal)}
+        return self.unseen - self._enclosed
+
+    @property
+    def _enclosed(self) -> frozenset[str]:
+        """Objects that a goal has taken out of furniture."""
+        return frozenset(g.object for g in self._task.goals if isinstance(g, TakenOutGoal))
 
     @property
     def _uncertain(self) -> tuple[str, ...]:
@@ -200,17 +201,21 @@ class EstimatedPerception:
             self._build()
 
     def look_again(self) -> None:
-        """After something was opened: measure it, and look for what it hid.
-
-        Raises:
-          StageFailure: What has to be taken out of it is not seen still.
-        """
+        """After something was opened: measure it, and look for what it hid."""
         self.observe()  # where parts and objects are by now
         self._world.look_again(self._keys())
         self._find_objects()
         self._build()
-        for name in self.unseen:
-            raise StageFailure("perception", f"no camera sees enough of {name}, opened or not")
+
+    def look_closely(self) -> None:
+        """Estimate what goals have taken out of furniture by what the hand's camera sees, besides all others."""
+        self.observe()
+        for name in sorted(self._enclosed):
+            sensed = self._looked_at(name, self._close_views)
+            if sensed is not None:
+                self._known[name] = sensed
+                self._grasps[name] = self._grasps_of(name, self._close_views)
+        self._build()
 
     @property
     def _needed(self) -> set[str]:
@@ -224,14 +229,14 @@ class EstimatedPerception:
             if sensed is not None:
                 self._known[name] = sensed
 
-    def _looked_at(self, name: str) -> SensedPose | None:
-        """The estimate of what may have any shape of its kind."""
+    def _looked_at(self, name: str, more: ObjectViews | None = None) -> SensedPose | None:
+        """The estimate of what may have any shape of its kind; by `more` views, of all standing cameras, if need be."""
+        more = more or self._more_views
         kind, views = self._kinds()[name], self._views.of(self._physics, name)
-        sensed = self._sensed(name, views, shapes_of(kind), again=True)
+        sensed = self._sensed(name, views, shapes_of(kind), more)
         if sensed is None:
             return None
-        seen = views or self._more_views.of(self._physics, name)
-        return sensed_if_flat(kind, sensed, seen)
+        return sensed_if_flat(kind, sensed, views or more.of(self._physics, name))
 
     def _build(self) -> None:
         for name in self._known:
@@ -312,12 +317,12 @@ class EstimatedPerception:
             return before
         if weighed(sensed.misfit, sensed.confidence) > _BETTER * weighed(misfit, before.confidence):
             return before
-        if held and not self._may_be_lost() and not _nearly(sensed, before):
+        if held and not self._may_be_lost() and not agree(sensed, before, _IN_HAND):
             return before
         sensed = replace(sensed, points=before.points)  # the shape is the old one
         if self._held is not None and held:
             self._held = (name, invert(tcp) @ sensed.pose)
-            if not _nearly(sensed, before):
+            if not agree(sensed, before, _IN_HAND):
                 self._dropped.add(name)
         return sensed
 
@@ -330,24 +335,24 @@ class EstimatedPerception:
         name: str,
         views: tuple[ObjectView, ...],
         shapes: ShapeFitter,
-        *,
-        again: bool = False,
+        more: ObjectViews | None = None,
     ) -> SensedPose | None:
-        """From these views; from all cameras', if it may look again, where they leave an object uncertain."""
-        estimator = self._load(self._kinds()[name])
-        sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
-        if sensed is not None and (sensed.confidence >= _TRUSTED or not again):
+        """From these views; from more, if there are, where these leave an object uncertain or walls hide the same part of
+        it from them."""
+        estimator, sensed = self._load(self._kinds()[name]), None
+        if more is None or name not in self._enclosed:
+            sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
+        if more is None or (sensed is not None and sensed.confidence >= _TRUSTED):
             return sensed
-        views = self._more_views.of(self._physics, name)
+        views = more.of(self._physics, name)
         second = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
         if sensed is None or second is None:
             return second or sensed
-        shift, turn = pose_error(second.pose, sensed.pose, sensed.shape.label.symmetry)
-        if shift < _AGREED[0] and turn < _AGREED[1]:  # the usual cameras are nearer: more precise
+        if agree(second, sensed, _AGREED):  # the usual cameras are nearer: more precise
             return replace(sensed, confidence=max(sensed.confidence, second.confidence))
         return second if second.confidence > sensed.confidence else sensed
 
-    def _grasps_of(self, name: str) -> Callable[[], GraspSet]:
+    def _grasps_of(self, name: str, by: ObjectViews | None = None) -> Callable[[], GraspSet]:
         """Samples grasps of what is seen now, for the pose estimated and those that goals ask for; once, when asked to."""
         symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
         goals = [goal for goal in self._task.goals if getattr(goal, "object", None) == name]
@@ -358,7 +363,8 @@ class EstimatedPerception:
             if frame is not None and frame.rotation_counts
         ]
         sensed = self._known[name]
-        views = self._views.of(self._physics, name) or self._more_views.of(self._physics, name)
+        views = (by or self._views).of(self._physics, name)
+        views = views or self._more_views.of(self._physics, name)
 
         @cache
         def sample() -> GraspSet:
@@ -390,9 +396,3 @@ class EstimatedPerception:
             guessed_frame=not kind.in_catalogue
             or kind.object_type != sensed.shape.label.object_type,
         )
-
-
-def _nearly(sensed: SensedPose, before: SensedPose) -> bool:
-    """Whether two poses differ by no more than an object slips in the hand."""
-    shift, turn = pose_error(sensed.pose, before.pose, before.shape.label.symmetry)
-    return bool(shift < _IN_HAND[0] and turn < _IN_HAND[1])

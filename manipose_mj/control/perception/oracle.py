@@ -31,6 +31,7 @@ class OraclePerception:
         self.sources: Mapping[str, str] = {"objects": "true", "furniture": self._furniture.source}
 
     feels_joints = False
+    looks_by_hand = False
     unseen: frozenset[str] = frozenset()
 
     @property
@@ -68,6 +69,9 @@ class OraclePerception:
         """Nothing is hidden or uncertain."""
 
     def look_again(self) -> None:
+        """Nothing is hidden."""
+
+    def look_closely(self) -> None:
         """Nothing is hidden."""
 
     def _object(self, name: str, entity: RigidObject) -> ObjectEstimate:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import StablePose
 from manipose_mj.control.motion.arm_model import ArmModel
-from manipose_mj.control.perception.estimated import EstimatedPose
+from manipose_mj.control.perception.pose_sensing import EstimatedPose
 from manipose_mj.control.perception.protocol import Perception
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.poses import compose, invert, rotation_about
@@ -60,6 +60,7 @@ class PerturbedPerception:
         self._wrong: dict[str, Float[np.ndarray, "4 4"]] = {}
         self.sources: Mapping[str, str] = perception.sources
         self.feels_joints = perception.feels_joints
+        self.looks_by_hand = perception.looks_by_hand
         self.last_estimates: tuple[EstimatedPose, ...] = ()
 
     @property
@@ -87,6 +88,10 @@ class PerturbedPerception:
     def look_again(self) -> None:
         """Look at what was opened, and into it; what is found gets an error of its own."""
         self._perception.look_again()
+
+    def look_closely(self) -> None:
+        """Look through the hand's camera too."""
+        self._perception.look_closely()
 
     def reset(self, seed: int) -> None:
         """Start an episode; errors follow from the seed of its sensors, whatever `seed` is."""

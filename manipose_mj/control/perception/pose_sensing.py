@@ -12,7 +12,7 @@ from jaxtyping import Float
 from manipose_mj.control.perception.objects.known_shapes import KnownShape
 from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.objects.shape_fits import ShapeFit, ShapeFitter
-from manipose_mj.poses import invert, rotation_angle, transform
+from manipose_mj.poses import invert, pose_error, rotation_angle, transform
 
 if TYPE_CHECKING:
     from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
@@ -60,6 +60,19 @@ class SensedPose:
     confidence: float
     camera: str
     points: int = 0
+
+
+@dataclass(frozen=True)
+class EstimatedPose:
+    """The pose of an object at the last observation, for reports.
+
+    Attributes: name; pose `T_world_label`; confidence: when it was estimated; camera: that saw it.
+    """
+
+    name: str
+    pose: Float[np.ndarray, "4 4"]
+    confidence: float
+    camera: str
 
 
 def sense_pose(
@@ -129,6 +142,12 @@ def _with_shape(
     points = seen_points(views)
     misfit = shape.misfit(transform(invert(pose), points))
     return SensedPose(pose, shape, misfit, confidence, camera, len(points))
+
+
+def agree(one: SensedPose, other: SensedPose, within: tuple[float, float]) -> bool:
+    """Whether two poses of an object differ by less than this [m, rad]; the other's shape has its symmetry."""
+    shift, turn = pose_error(one.pose, other.pose, other.shape.label.symmetry)
+    return bool(shift < within[0] and turn < within[1])
 
 
 def weighed(misfit: float, confidence: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset
-from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SENSORS
+from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SENSORS, standing_cameras
 from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
@@ -79,7 +79,7 @@ def _perception(
         return OraclePerception(task, physics)
     world: World
     if pose == "estimated":
-        cameras = task.env_config.sensors.camera_names
+        cameras = standing_cameras(task.env_config.sensors)
         front = tuple(name for name in FRONT_CAMERAS if name in cameras) or cameras
         world = SensedWorld(task, physics, cameras, front)
     else:

@@ -18,11 +18,13 @@ class Perception(Protocol):
     Attributes:
       sources: `"true"` or `"estimated"` of what it knows of `"objects"` and `"furniture"`; what is told of `"kinds"`.
       feels_joints: Whether it corrects joints by what the hand feels.
+      looks_by_hand: Whether the hand has a camera that it looks through.
       unseen: Objects of goals that nothing has shown yet.
     """
 
     sources: Mapping[str, str]
     feels_joints: bool
+    looks_by_hand: bool
 
     @property
     def unseen(self) -> frozenset[str]: ...
@@ -68,4 +70,8 @@ class Perception(Protocol):
 
     def look_again(self) -> None:
         """Look at what was opened, and into it; plans made before no longer count."""
+        ...
+
+    def look_closely(self) -> None:
+        """Look through the hand's camera too, which was brought before something that was opened."""
         ...

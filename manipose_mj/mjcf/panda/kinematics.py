@@ -32,6 +32,10 @@ DH = np.array(
 )
 FLANGE_OFFSET = 0.107  # link 7 to flange along z [m]
 HAND_YAW = -np.pi / 4  # flange to hand about z [rad]
+# The hand's camera, hand frame [m, rad]: beside the hand, and tilted to the fingertips, which the hand would hide from
+# further up. Its image's right is along y.
+WRIST_CAMERA = (0.070, 0.0, 0.040)
+WRIST_TILT = np.pi / 6
 
 POSITION_LIMITS = np.array(
     [

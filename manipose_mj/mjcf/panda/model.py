@@ -35,6 +35,8 @@ from manipose_mj.mjcf.panda.kinematics import (
     INERTIALS,
     POSITION_LIMITS,
     TORQUE_LIMITS,
+    WRIST_CAMERA,
+    WRIST_TILT,
 )
 from manipose_mj.mjcf.panda.menagerie import visual_meshes
 
@@ -132,12 +134,11 @@ def _add_hand(model: mjcf.RootElement) -> None:
     yaw = (np.cos(HAND_YAW / 2), 0.0, 0.0, np.sin(HAND_YAW / 2))
     hand = _add_body(model.find("body", "link7"), "hand", pos=(0, 0, FLANGE_OFFSET), quat=yaw)
     hand.add("site", name="tcp", pos=(0, 0, TCP_OFFSET), size=(0.003,), rgba=(0, 0, 0, 0))
-    # Beside the hand and tilted 30 deg to the fingertips, which the hand would hide from further up.
     hand.add(
         "camera",
         name="wrist",
-        pos=(0.070, 0.0, 0.040),
-        xyaxes=(0, 1, 0, np.cos(np.pi / 6), 0, np.sin(np.pi / 6)),
+        pos=WRIST_CAMERA,
+        xyaxes=(0, 1, 0, np.cos(WRIST_TILT), 0, np.sin(WRIST_TILT)),
         fovy=75.0,
     )
     half_turn = (0, 0, 0, 1)

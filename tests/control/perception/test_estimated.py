@@ -14,8 +14,9 @@ from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.grasping.pick import pick_object
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.camera_rig import SENSORS
-from manipose_mj.control.perception.estimated import EstimatedPerception, EstimatedPose
+from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
+from manipose_mj.control.perception.pose_sensing import EstimatedPose
 from manipose_mj.control.planning.plan import plan_to_json
 from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.errors import InputError

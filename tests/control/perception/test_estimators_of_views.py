@@ -8,9 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipose_mj.assets.franka_hand import MAX_OPENING
+from manipose_mj.control.grasping.candidates import reachable
+from manipose_mj.control.perception.camera_rig import HAND_CAMERA
+from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
 from manipose_mj.control.perception.objects.shape_fits import KnownShapes
 from manipose_mj.control.perception.pose_sensing import sense_pose
+from manipose_mj.mjcf.panda.kinematics import HOME
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.estimator import PoseEstimate
 from tests.control.perception.recalled import Recalled, perception_of
@@ -36,6 +41,38 @@ def test_an_estimator_of_views_is_asked_once_a_look(cup, truth, confidence, aske
     known = perception._known["object"]
     np.testing.assert_allclose(known.pose, truth[0], atol=1e-9)
     assert known.camera.split("+")[0] == "front"
+
+
+def test_what_lies_in_furniture_is_seen_by_all_cameras_at_once(cup, truth, monkeypatch):
+    estimator = OfViews(*truth)
+    perception = perception_of(cup, estimator)
+    monkeypatch.setattr(EstimatedPerception, "_enclosed", frozenset({"object"}))
+    perception.reset(0)
+    assert estimator.asked == 1
+    assert len(estimator.cameras) > 3
+
+
+def test_the_hand_s_camera_counts_where_it_was_brought_to_look(cup, truth, monkeypatch):
+    pose, extents = truth
+    estimator = OfViews(pose, 1.2 * extents)
+    perception = perception_of(cup, estimator)
+    monkeypatch.setattr(EstimatedPerception, "_enclosed", frozenset({"object"}))
+    perception.reset(0)
+    assert HAND_CAMERA not in estimator.cameras
+    standing, grasps = len(estimator.cameras), perception._grasps["object"]
+    # So that it sees the cup: above it, further than a depth camera's least distance.
+    above = pose[:3, 3] + [0.0, 0.0, 0.40]
+    reach = reachable(compose(np.diag([1.0, -1.0, -1.0]), above)[None], HOME)
+    cup.task.robot.set_configuration(cup.physics, reach.joints[0], MAX_OPENING)
+    cup.step(np.append(reach.joints[0], MAX_OPENING))
+    estimator.extents = extents
+    perception.look_closely()
+    assert HAND_CAMERA in estimator.cameras
+    assert len(estimator.cameras) >= standing
+    np.testing.assert_allclose(
+        perception.observe().objects["object"].label.extents, extents, atol=1e-9
+    )
+    assert perception._grasps["object"] is not grasps
 
 
 @pytest.mark.parametrize(
