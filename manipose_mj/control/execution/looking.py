@@ -7,6 +7,7 @@ from itertools import islice
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.assets.asset import Cavity
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.control.motion.batch_ik import seeds_for, solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -35,9 +36,11 @@ def way_to_look_into(
     Args:
       planner: In the scene as it is.
       estimate: What is where.
-      part: With a cavity.
+      part: Open.
     """
-    looks = _looks(part) @ invert(_camera_in_hand())
+    if part.cavity is None:
+        return None
+    looks = _looks(part, part.cavity) @ invert(_camera_in_hand())
     joints, solved = solve(looks, seeds_for(looks))
     away = np.abs(joints - estimate.joints).sum(axis=-1)
     free = (
@@ -53,10 +56,8 @@ def way_to_look_into(
     return None
 
 
-def _looks(part: PartEstimate) -> Float[np.ndarray, "n 4 4"]:
-    """`T_world_camera` of places to look from, the best first; OpenCV's axes."""
-    cavity = part.cavity
-    assert cavity is not None
+def _looks(part: PartEstimate, cavity: Cavity) -> Float[np.ndarray, "n 4 4"]:
+    """`T_world_camera` of places to look into the cavity from, the best first; OpenCV's axes."""
     frame = part.pose if cavity.moves_with_part else part.base_pose
     target = frame[:3, :3] @ cavity.center + frame[:3, 3]
     out = part.base_pose[:3, :3] @ outwards(part)
@@ -66,10 +67,7 @@ def _looks(part: PartEstimate) -> Float[np.ndarray, "n 4 4"]:
             axis = -np.cos(tilt) * _UP - np.sin(tilt) * out
             right = np.cross(axis, _UP)
             right /= np.linalg.norm(right)
-            for side in (
-                right,
-                -right,
-            ):  # upright, or head over: the hand is above or below the camera
+            for side in (right, -right):  # upright, or head over with the hand above the camera
                 rotation = np.stack([side, np.cross(axis, side), axis], axis=1)
                 found.append(compose(rotation, target - distance * axis))
     return np.array(found)
@@ -77,9 +75,7 @@ def _looks(part: PartEstimate) -> Float[np.ndarray, "n 4 4"]:
 
 def _camera_in_hand() -> Float[np.ndarray, "4 4"]:
     """`T_tcp_camera`, OpenCV's axes."""
-    right, down = (
-        np.array([0.0, 1.0, 0.0]),
-        -np.array([np.cos(WRIST_TILT), 0.0, np.sin(WRIST_TILT)]),
-    )
+    right = np.array([0.0, 1.0, 0.0])
+    down = np.array([-np.cos(WRIST_TILT), 0.0, -np.sin(WRIST_TILT)])
     rotation = np.stack([right, down, np.cross(right, down)], axis=1)
     return compose(rotation, np.array(WRIST_CAMERA) - [0.0, 0.0, TCP_OFFSET])

@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution.looking import way_to_look_into
 from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.perception.camera_rig import HAND_CAMERA
+from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.control.scene.articulation import joint_motion, with_part_at
+from manipose_mj.evaluation.protocol.frozen import load as load_protocol
 from manipose_mj.mjcf.cameras.ray_camera import camera_pose
-from manipose_mj.poses import invert
+from manipose_mj.poses import invert, pose_error
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from tests.few_objects import load
 
 WIDE_OPEN = 0.85  # of a part's range
@@ -59,3 +64,28 @@ def test_where_there_is_no_room_it_does_not_look(opened):
     far = part.base_pose.copy()
     far[:3, 3] += [3.0, 0.0, 0.0]
     assert way_to_look_into(planner, estimate, replace(part, base_pose=far, pose=far)) is None
+
+
+@pytest.mark.full
+def test_what_was_opened_is_looked_into_and_then_estimated_by_the_hand_s_camera_too():
+    task = "articulated/take_out_microwave"
+    environment = suite.make(
+        EnvConfig(task, obs_mode="state", split="test", sensors=sensors_for("estimated"))
+    )
+    environment.reset(EpisodeSpec(**load_protocol("v1").episode(task, 1).asked))
+    baseline = Baseline(environment, "estimated")
+    looked = False
+    for action in baseline.actions(0):
+        environment.step(action)
+        looking = baseline.status.startswith("look into")
+        if looked and not looking:
+            break
+        looked |= looking
+    assert looked
+    estimates = {each.name: each for each in baseline.perception.last_estimates}
+    assert HAND_CAMERA in estimates["object"].camera.split("+")
+    label = environment.task.object.asset.label
+    truth = environment.task.object.label_pose(environment.physics)
+    shift, turn = pose_error(estimates["object"].pose, truth, label.symmetry)
+    assert shift < 0.02
+    assert turn < np.deg2rad(15)
