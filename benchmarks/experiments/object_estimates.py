@@ -31,6 +31,7 @@ from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import pose_error
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.environment import TaskEnvironment
 
 RIGHT = (0.02, np.deg2rad(15.0))
 
@@ -58,16 +59,22 @@ def of_single_views(kind: ObjectKind) -> Estimator:
     return PoseEstimator.load(kind.category if kind.in_catalogue else kind.object_type)
 
 
-def estimates(
-    protocol: Protocol, task: str, number: int, resample: int | None, networks: str
-) -> Iterator[Estimated]:
-    """Of every object that is seen at a start."""
+def started(protocol: Protocol, task: str, number: int, resample: int | None) -> TaskEnvironment:
+    """An environment at a start of the protocol, or at one of another seed, with the cameras of estimates."""
     asked = dict(protocol.episode(task, number).asked)
     if resample is not None:
         asked["seed"] = episode_seed(resample, f"{protocol.version}/{task}", number)
     config = EnvConfig(task, obs_mode="state", split="test", sensors=sensors_for("estimated"))
     environment = environment_of(config)
     environment.reset(EpisodeSpec(**asked))
+    return environment
+
+
+def estimates(
+    protocol: Protocol, task: str, number: int, resample: int | None, networks: str
+) -> Iterator[Estimated]:
+    """Of every object that is seen at a start."""
+    environment = started(protocol, task, number, resample)
     chosen = of_single_views if networks == "one" else shipped_estimator
     perception = EstimatedPerception(environment.task, environment.physics, estimators=chosen)
     perception.reset(0)

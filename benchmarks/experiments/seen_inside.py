@@ -17,20 +17,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.experiments.object_estimates import Estimated, line
+from benchmarks.experiments.object_estimates import Estimated, line, started
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.execution.looking import way_to_look_into
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.camera_rig import CAMERAS, HAND_CAMERA
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews
 from manipose_mj.control.perception.pose_sensing import MIN_VIEW_POINTS, random_keys
-from manipose_mj.control.perception.pose_sources import sensors_for
-from manipose_mj.evaluation.config import episode_seed
-from manipose_mj.evaluation.episode import environment_of
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.poses import invert, pose_error, pose_to_vector
 from manipose_mj.ppf_jax.fused_views import FusedViewEstimator
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
 
 OPEN = 0.9  # of a part's range, doors up to WIDEST [rad]
@@ -73,17 +69,14 @@ def estimates(
     protocol: Protocol, task: str, number: int, resample: int | None
 ) -> Iterator[tuple[str, Estimated]]:
     """Of every object, by each rig."""
-    asked = dict(protocol.episode(task, number).asked)
-    if resample is not None:
-        asked["seed"] = episode_seed(resample, f"{protocol.version}/{task}", number)
-    config = EnvConfig(task, obs_mode="state", split="test", sensors=sensors_for("estimated"))
-    environment = environment_of(config)
-    environment.reset(EpisodeSpec(**asked))
+    environment = started(protocol, task, number, resample)
     open_part(environment)
     if not look_inside(environment):
         print(f"{task} {number}: the hand cannot look in", flush=True)
     physics, keys = environment.physics, random_keys(0)
-    views = ObjectViews(environment.task.task_observables, config.sensors.camera_names)
+    views = ObjectViews(
+        environment.task.task_observables, environment.task.env_config.sensors.camera_names
+    )
     for name, entity in environment.task.objects.items():
         seen, label = views.of(physics, name), entity.asset.label
         truth = entity.object_pose(physics) @ label.pose

@@ -24,6 +24,7 @@ _COARSE_CELL = 0.004  # of the hand's [m]
 _STEP = 0.03  # the hand's grids are as large as the object, to the next multiple of this [m]
 _BAND = 0.01  # the hand's boxes reach to a multiple of this along the closing direction [m]
 _BLOCK = 64  # pairs whose points are held at a time
+assert HANDS <= 64  # one bit each
 _BITS = np.uint64(1) << np.arange(HANDS, dtype=np.uint64)
 
 
