@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
+from shapely import MultiPoint, Point
 from trimesh.convex import convex_hull
 
 from manipose_mj.assets import catalogue
@@ -29,6 +30,9 @@ from manipose_mj.poses import SymmetryGroup, invert, transform
 SHAPES = 8  # training objects of a category that are known: its styles take turns among them
 _SURFACE_POINTS = 1500
 _ALIKE = 0.04  # relative difference of two lengths from which on a turn no longer exchanges them
+# Sides nearer to each other than this are one [rad]; at most so many are others' alone, with this probability; how far a
+# corner may be from what it lies on, and its centre of mass from being above that [m].
+_SIDE, _SIDES, _RARE, _UNEVEN = np.deg2rad(12.0), 3, 0.01, 0.003
 _FAR = (
     0.02  # a point further from the surface counts as this far: it is noise or somebody else's [m]
 )
@@ -122,7 +126,8 @@ def known_shapes(category: str) -> tuple[KnownShape, ...]:
     count = len(catalogue.instances(category))  # refuses what is no category
     row = catalogue.CATALOGUE[category]
     training = [index for index in range(count) if row.split(index) == "train"]
-    return tuple(shape_of(catalogue.load(category, index)) for index in training[:SHAPES])
+    shapes = [shape_of(catalogue.load(category, index)) for index in training[:SHAPES]]
+    return tuple(_resting_as(shape, shapes) for shape in shapes)
 
 
 def shape_of(asset: Asset) -> KnownShape:
@@ -148,6 +153,47 @@ def shape_of(asset: Asset) -> KnownShape:
         rests=rests,
         mass=replace(mass, center_of_mass=transform(to_label, mass.center_of_mass[None])[0]),
     )
+
+
+def _resting_as(shape: KnownShape, others: Sequence[KnownShape]) -> KnownShape:
+    """The shape, which may also lie on the sides that most others of its category lie on.
+
+    It stands in for objects of other proportions, such as mugs that lie still with the handle up where its own rolls.
+    """
+    symmetry = shape.label.symmetry
+    sides: list[tuple[int, StablePose]] = []
+    for rest in (rest for other in others for rest in other.rests):
+        if any(
+            _same_side(rest, known, symmetry)
+            for known in (*shape.rests, *(side for _, side in sides))
+        ):
+            continue
+        votes = sum(any(_same_side(rest, own, symmetry) for own in other.rests) for other in others)
+        lying = _lying(shape, rest)
+        if lying is not None and votes >= len(others) / 2:
+            sides.append((votes, lying))
+    sides.sort(key=lambda side: -side[0])
+    return replace(shape, rests=(*shape.rests, *(side for _, side in sides[:_SIDES])))
+
+
+def _same_side(one: StablePose, other: StablePose, symmetry: SymmetryGroup) -> bool:
+    """Whether two rests of the label's frame are on one side, symmetries apart."""
+    up, ups = one.rotation[2], other.rotation[2] @ symmetry.rotations
+    if symmetry.axial:
+        return bool(
+            (np.abs(np.arccos(ups[:, 0].clip(-1, 1)) - np.arccos(up[0].clip(-1, 1))) < _SIDE).any()
+        )
+    return bool((ups @ up > np.cos(_SIDE)).any())
+
+
+def _lying(shape: KnownShape, rest: StablePose) -> StablePose | None:
+    """The shape turned as `rest`, if it lies still so."""
+    turned = np.concatenate(shape.hulls) @ rest.rotation.T
+    lowest = float(turned[:, 2].min())
+    support = MultiPoint(turned[turned[:, 2] < lowest + _UNEVEN, :2]).convex_hull
+    if support.distance(Point(rest.rotation[:2] @ shape.mass.center_of_mass)) > _UNEVEN:
+        return None
+    return StablePose(rest.rotation, -lowest, _RARE)
 
 
 def _collision_hulls(asset: Asset) -> list[Float[np.ndarray, "_ 3"]]:
