@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import StablePose
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate
 from manipose_mj.mjcf.panda.robot import HOME
 from manipose_mj.poses import compose, rotation_about
@@ -132,4 +132,4 @@ def is_free(
     planner: MotionPlanner, obj: ObjectEstimate, label_pose: Float[np.ndarray, "4 4"]
 ) -> bool:
     """Whether the object would touch nothing but its support there."""
-    return not planner.collides(HOME, CollisionQuery(CONTACT, attached=obj.placed_at(label_pose)))
+    return not planner.collides(HOME, obj.placed_at(label_pose).query(CONTACT))

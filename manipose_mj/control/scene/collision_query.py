@@ -28,6 +28,12 @@ class Clearance:
     attached: float
     allows_contact: bool = False
 
+    def deeper(self, uncertainty: float) -> Clearance:
+        """The same of an attached object whose surface is uncertain [m]: where it may touch, it may seem deeper in."""
+        if self.attached >= 0:
+            return self
+        return replace(self, attached=self.attached - uncertainty)
+
 
 # Paths through free space; the same once their corners are rounded; the same where the ends leave
 # less room; motions that end in contact.
@@ -62,8 +68,7 @@ class AttachedObject:
 
     def query(self, clearance: Clearance = TRANSIT) -> CollisionQuery:
         """Whether the arm collides while it holds the object."""
-        if clearance.attached < 0:
-            clearance = replace(clearance, attached=clearance.attached - self.uncertainty)
+        clearance = clearance.deeper(self.uncertainty)
         return CollisionQuery(clearance, opening=self.opening, attached=self)
 
 
@@ -75,16 +80,22 @@ class FixedObject:
       body: Its body in the planning scene.
       geoms: Mask of its geoms there, `(ngeom,)`.
       place: `T_world_object`.
+      uncertainty: As of `AttachedObject`.
     """
 
     body: int
     geoms: Bool[np.ndarray, "ngeom"]
     place: Float[np.ndarray, "4 4"]
+    uncertainty: float = 0.0
 
     def pose(self, tcp_pose: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
         """The place, wherever the TCP is."""
         del tcp_pose
         return self.place
+
+    def query(self, clearance: Clearance = TRANSIT) -> CollisionQuery:
+        """Whether the object or the arm collides."""
+        return CollisionQuery(clearance.deeper(self.uncertainty), attached=self)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,10 @@ from manipose_mj.control.scene.collision_model import CollisionModel, Contacts, 
 from manipose_mj.control.scene.collision_query import CollisionQuery
 from manipose_mj.poses import pose_to_vector, vector_to_pose
 
+_HARDLY = (
+    1e-6  # how deep the robot counts as being in what it is too close to and does not touch [m]
+)
+
 
 @dataclass(frozen=True)
 class PlanningScene:
@@ -115,7 +119,8 @@ class PlanningScene:
     def depths(
         self, joints: Float[np.ndarray, "7"], query: CollisionQuery
     ) -> Float[np.ndarray, "ngeom"]:
-        """How deep the robot is in each geom that it is too close to [m]; zero in the others.
+        """How deep the robot is in each geom that it is too close to, hardly at all if it does not touch it [m]; zero in
+        the others.
 
         A robot that is where it is cannot be in what is solid: estimates have put that too near. All geoms of a body
         count as one, for they are off together; those of the world are bodies of their own.
@@ -131,7 +136,7 @@ class PlanningScene:
             other = second if self.robot[first] else first
             body = int(self.model.geom_bodyid[other])
             alike = self.model.geom_bodyid == body if body else np.arange(len(depths)) == other
-            depths[alike] = np.maximum(depths[alike], -distance)
+            depths[alike] = np.maximum(depths[alike], max(-distance, _HARDLY))
         return depths
 
     def touching(

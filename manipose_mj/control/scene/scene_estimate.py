@@ -98,7 +98,8 @@ class ObjectEstimate:
 
     def placed_at(self, label_pose: Float[np.ndarray, "4 4"]) -> FixedObject:
         """The object with its label at `T_world_label`."""
-        return FixedObject(self.body, self.geoms, label_pose @ invert(self.label.pose))
+        place = label_pose @ invert(self.label.pose)
+        return FixedObject(self.body, self.geoms, place, self.uncertainty)
 
 
 @dataclass(frozen=True)

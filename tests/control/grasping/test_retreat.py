@@ -10,7 +10,7 @@ import pytest
 from manipose_mj.control.grasping.retreat import RETREATS, retreat
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
-from manipose_mj.control.scene.collision_query import CONTACT, TRANSIT, CollisionQuery
+from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, TRANSIT, CollisionQuery
 
 _AT = np.array([0.3, 0.4, 0.30])  # of the TCP; the can stands below
 _BESIDE = np.array([0.02, 0.02, 0.0])  # the can is beneath a finger [m]
@@ -70,6 +70,15 @@ def test_it_goes_no_deeper_into_anything(let_go, tcp_at):
     assert planner.collides(deeper, excused)
     assert planner.ignored(usual) == frozenset()
     assert planner.ignored(excused) >= {"world"}
+
+
+def test_a_hand_closer_than_allowed_that_touches_nothing_may_stay_so(let_go, tcp_at):
+    planner, estimate, _ = let_go(-0.0005)
+    grazing = CollisionQuery(GRAZING)
+    assert planner.collides(estimate.joints, grazing)
+    excused = planner.excusing(estimate.joints, grazing)
+    assert not planner.collides(estimate.joints, excused)
+    assert planner.collides(tcp_at(_AT - [0.0, 0.0, 0.004]), excused)
 
 
 def test_a_hand_that_touches_nothing_is_excused_for_nothing(let_go):
