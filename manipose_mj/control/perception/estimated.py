@@ -53,7 +53,6 @@ from manipose_mj.tasks.goals import OnTableGoal, PoseGoal, TakenOutGoal
 
 _SURE = 0.6  # confidence from which on an estimate is kept for as long as it fits what is seen
 _TRUSTED = 0.8  # confidence under which all cameras are asked before an estimate is used
-_AGREED = (0.02, np.deg2rad(15.0))  # of a second look with the first [m, rad]
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
 _MORE = 1.5  # times the points that a shape was found by, from which on it is found anew
 _BETTER = 0.9  # of what is left of the weighed misfit, for another pose to replace it
@@ -337,19 +336,21 @@ class EstimatedPerception:
         shapes: ShapeFitter,
         more: ObjectViews | None = None,
     ) -> SensedPose | None:
-        """From these views; from more, if there are, where these leave an object uncertain or walls hide the same part of
-        it from them."""
+        """From these views; from more, if there are, where these leave an object uncertain, are of one side of it, or walls
+        hide the same part of it from them."""
         estimator, sensed = self._load(self._kinds()[name]), None
         if more is None or name not in self._enclosed:
             sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
-        if more is None or (sensed is not None and sensed.confidence >= _TRUSTED):
+        one_side = len(views) < 2
+        trusted = sensed is not None and sensed.confidence >= _TRUSTED
+        if more is None or (trusted and not one_side):
             return sensed
         views = more.of(self._physics, name)
         second = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
         if sensed is None or second is None:
             return second or sensed
-        if agree(second, sensed, _AGREED):  # the usual cameras are nearer: more precise
-            return replace(sensed, confidence=max(sensed.confidence, second.confidence))
+        if one_side and second.confidence >= _TRUSTED:
+            return second
         return second if second.confidence > sensed.confidence else sensed
 
     def _grasps_of(self, name: str, by: ObjectViews | None = None) -> Callable[[], GraspSet]:

@@ -22,6 +22,7 @@ from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, tr
 
 # Of round test objects only bins fit worse, and their rectangles are nearly squares.
 _ROUND = 0.005  # misfit up to which what is seen is round [m]
+_VIEWS = 2  # cameras; one sees of what is round a side that is less deep than wide
 _FLAT = 0.85  # of its length, a rectangle's width from which on it is none
 _AS_WELL = 1.05  # times the misfit of the round shape, up to which something flat is believed
 _ANGLES = 45  # of a quarter turn
@@ -39,6 +40,8 @@ def sensed_if_flat(kind: ObjectKind, sensed: SensedPose, views: Sequence[ObjectV
       views: That it was sensed in.
     """
     if not (kind.in_catalogue and kind.object_type == "axial") or sensed.misfit <= _ROUND:
+        return sensed
+    if len(views) < _VIEWS:
         return sensed
     points = seen_points(views)
     about, lengths = _rectangle(transform(invert(sensed.pose), points)[:, 1:])

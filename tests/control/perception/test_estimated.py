@@ -16,6 +16,7 @@ from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.camera_rig import SENSORS
 from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
+from manipose_mj.control.perception.objects.object_views import ObjectViews
 from manipose_mj.control.perception.pose_sensing import EstimatedPose
 from manipose_mj.control.planning.plan import plan_to_json
 from manipose_mj.control.planning.planner import make_plan
@@ -167,31 +168,47 @@ def test_low_confidence_brings_in_another_camera(cup, truth):
 
 
 class Wavering(Recalled):
-    """Says something else from the fourth question on: when all cameras are asked."""
+    """Says something else once all cameras are asked, which is from some question on."""
 
-    def __init__(self, first: np.ndarray, then: np.ndarray, extents: np.ndarray) -> None:
-        super().__init__(first, extents, confidence=0.3)
-        self.then = then
+    def __init__(
+        self,
+        first: np.ndarray,
+        then: np.ndarray,
+        extents: np.ndarray,
+        sure: tuple[float, float],
+        after: int = 3,
+    ) -> None:
+        super().__init__(first, extents, confidence=sure[0])
+        self.then, self.sure, self.after = then, sure[1], after
 
     def estimate(self, cloud: Any, *, key: Any) -> PoseEstimate:
-        if self.asked == 3:
-            self.pose_world, self.confidence = self.then, 0.7
+        if self.asked == self.after:
+            self.pose_world, self.confidence = self.then, self.sure
         return super().estimate(cloud, key=key)
 
 
-@pytest.mark.parametrize("agrees", [True, False])
-def test_a_second_look_replaces_what_it_contradicts(cup, truth, agrees):
-    pose, extents = truth
+def shifted(pose: np.ndarray) -> np.ndarray:
     other = np.array(pose)
-    if agrees:
-        other[:3, 3] += [0.004, 0.0, 0.0]
-    else:
-        other[:3, :2] *= -1.0
-    perception = perception_of(cup, Wavering(pose, other, extents))
+    other[:3, 3] += [0.004, 0.0, 0.0]
+    return other
+
+
+@pytest.mark.parametrize(("second", "surer"), [(0.7, True), (0.2, False)])
+def test_the_surer_of_two_looks_is_believed(cup, truth, second, surer):
+    pose, extents = truth
+    perception = perception_of(cup, Wavering(pose, shifted(pose), extents, (0.3, second)))
     perception.reset(0)
     known = perception._known["object"]
-    np.testing.assert_allclose(known.pose, pose if agrees else other, atol=1e-6)
-    assert known.confidence == 0.7
+    np.testing.assert_allclose(known.pose, shifted(pose) if surer else pose, atol=1e-6)
+    assert known.confidence == max(second, 0.3)
+
+
+def test_what_one_camera_sees_is_looked_at_by_all_however_sure_it_is(cup, truth):
+    pose, extents = truth
+    perception = perception_of(cup, Wavering(pose, shifted(pose), extents, (0.95, 0.9), after=1))
+    perception._views = ObjectViews(cup.task.task_observables, ("left",))
+    perception.reset(0)
+    np.testing.assert_allclose(perception._known["object"].pose, shifted(pose), atol=1e-6)
 
 
 def test_what_no_camera_sees_fails_in_perception(cup, truth):

@@ -42,7 +42,7 @@ def sensed_can(flatness: float) -> tuple[SensedPose, np.ndarray, ObjectView]:
 
 def test_a_flat_can_is_turned_as_its_sides_are():
     sensed, truth, view = sensed_can(0.6)
-    found = sensed_if_flat(CAN, sensed, (view,))
+    found = sensed_if_flat(CAN, sensed, (view, view))
     label = found.shape.label
     assert label.object_type == "mirror" and not label.symmetry.axial
     assert len(label.symmetry.rotations) == 2, "half a turn about its axis changes nothing"
@@ -57,4 +57,9 @@ def test_a_flat_can_is_turned_as_its_sides_are():
 )
 def test_what_is_round_or_no_round_category_of_the_catalogue_stays(kind):
     sensed, _, view = sensed_can(1.0 if kind is CAN else 0.6)
-    assert sensed_if_flat(kind, sensed, (view,)) is sensed
+    assert sensed_if_flat(kind, sensed, (view, view)) is sensed
+
+
+def test_by_one_camera_nothing_is_told_to_be_flat():
+    sensed, _, view = sensed_can(0.6)
+    assert sensed_if_flat(CAN, sensed, (view,)) is sensed
