@@ -30,12 +30,14 @@ def named(
       StageFailure: There is none.
     """
     parts = list(model.parts)
+    body = (float(model.solid[:, 0, 2].min()), float(model.solid[:, 1, 2].max()))
     for name, words in asked.items():
         free = [i for i, part in enumerate(parts) if part.name not in asked]
         opened = [i for i in free if parts[i].opening > 0]
         # What shall be shut stands open.
         free = opened if name in expected_open and opened else free
-        index = meant_part(words, [_candidate(parts[i]) for i in free], model.category)
+        candidates = [_candidate(parts[i]) for i in free]
+        index = meant_part(words, candidates, model.category, body)
         if index is None:
             raise StageFailure("perception", f"no camera shows the {words} of the {model.category}")
         chosen = parts[free[index]]

@@ -34,7 +34,12 @@ class Candidate:
     length: float = 0.1
 
 
-def meant_part(words: str, candidates: Sequence[Candidate], category: str = "") -> int | None:
+def meant_part(
+    words: str,
+    candidates: Sequence[Candidate],
+    category: str = "",
+    body: tuple[float, float] | None = None,
+) -> int | None:
     """Index of the part that words mean; None where there is none.
 
     One that would be called so itself, or else the one that comes nearest: a part may have been missed,
@@ -44,6 +49,8 @@ def meant_part(words: str, candidates: Sequence[Candidate], category: str = "") 
       words: As of `part_words`.
       candidates: Of one piece of furniture.
       category: Of it.
+      body: How low and how high it reaches, as the candidates' handles are told [m]. The middle one of a column is nearest
+        to its middle, where others were missed.
     """
     the_oven_door = category == "oven" and words == "door"
     for least in _LEAST[-1:] if the_oven_door else _LEAST:
@@ -53,7 +60,7 @@ def meant_part(words: str, candidates: Sequence[Candidate], category: str = "") 
             (
                 _oven_cost([candidates[k] for k in chosen], candidates[i])
                 if the_oven_door
-                else _cost(words, parts, candidates[i])
+                else _cost(words, parts, candidates[i], body)
             )
             + _UNSURE * (1 - candidates[i].confidence)
             for i in chosen
@@ -63,7 +70,12 @@ def meant_part(words: str, candidates: Sequence[Candidate], category: str = "") 
     return None
 
 
-def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> float:
+def _cost(
+    words: str,
+    parts: Sequence[MovingPart],
+    candidate: Candidate,
+    body: tuple[float, float] | None,
+) -> float:
     """How far a part is from what words say, in places."""
     part = candidate.part
     noun = "drawer" if "drawer" in words.split() else "door"
@@ -76,8 +88,9 @@ def _cost(words: str, parts: Sequence[MovingPart], candidate: Candidate) -> floa
     rows = rows_of(alike)
     row = next(i for i, each in enumerate(rows) if any(p is part for p in each))
     heights = [float(_handle(p)[2]) for p in alike]
+    height = float(_handle(part)[2])
     row_cost = _place_cost(
-        words, ("bottom", "middle", "top"), row, len(rows), float(_handle(part)[2]), heights
+        words, ("bottom", "middle", "top"), row, len(rows), height, heights, body
     )
     beside = sorted(rows[row], key=lambda p: -_from_right(p))
     column = next(i for i, p in enumerate(beside) if p is part)
@@ -113,6 +126,7 @@ def _place_cost(
     count: int,
     place: float,
     places: list[float],
+    body: tuple[float, float] | None = None,
 ) -> float:
     """How far a part's place along one direction is from the one that words name."""
     said = words.split()
@@ -128,7 +142,10 @@ def _place_cost(
     if named:
         return _SHARE * (share if named[0] == first else 1 - share)
     # The middle of one direction only, where the other has its own word or one place.
-    return _SHARE * abs(index - (count - 1) / 2) / max(count, 1)
+    off = _SHARE * abs(index - (count - 1) / 2) / max(count, 1)
+    if body is not None and count % 2 == 0:  # one was missed: which of two it is, the body tells
+        off += abs(place - sum(body) / 2) / (body[1] - body[0])
+    return off
 
 
 def _handle(part: MovingPart) -> np.ndarray:

@@ -294,6 +294,8 @@ def poses_in_cavity(
     if estimate is not None and not any((reach <= room).all() for _, reach in boxes):
         # A box around a box that is tilted is larger than one around what tapers.
         boxes = [obj.box_around(estimate.scene, rotation) for rotation in rotations]
+    if obj.uncertainty > 0 and not any((reach <= room).all() for _, reach in boxes):
+        room = room + obj.uncertainty  # it may be that much smaller
     for rotation, (middle, reach) in zip(rotations, boxes, strict=True):
         slack = room - reach
         if (slack < 0).any():

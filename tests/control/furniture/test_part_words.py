@@ -57,6 +57,15 @@ def test_what_was_missed_leaves_the_nearest():
     assert found("bottom drawer", COLUMN[1:]) == "drawer_1"
 
 
+def test_where_one_was_missed_the_middle_one_is_in_the_middle_of_the_body():
+    for missed in (0, 1, 3, 4):
+        parts = [part for k, part in enumerate(COLUMN) if k != missed]
+        sure = [0.7 if part is COLUMN[2] else 0.8 for part in parts]
+        candidates = [Candidate(p, c) for p, c in zip(parts, sure, strict=True)]
+        index = meant_part("middle drawer", candidates, "cabinet", body=(0.0, 0.8))
+        assert index is not None and parts[index].name == "drawer_2"
+
+
 def test_a_single_part_that_was_taken_for_another_kind_is_meant_still():
     assert found("door", [part("only", 0.0, 0.3)]) == "only"
     assert found("door", []) is None
