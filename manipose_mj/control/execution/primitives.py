@@ -205,7 +205,7 @@ class Primitives:
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
         attached = estimate.in_hand(name)
-        free = transport_path(planner, estimate.joints, place.above, attached)
+        free = transport_path(planner, estimate.joints, place.above, attached, pressed=True)
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
         yield from self._executor.follow(free)

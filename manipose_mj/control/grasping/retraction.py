@@ -166,10 +166,13 @@ def transport_path(
     start: Float[np.ndarray, "7"],
     goal: Float[np.ndarray, "7"],
     attached: AttachedObject,
+    *,
+    pressed: bool = False,
 ) -> Float[np.ndarray, "t 7"] | None:
     """Joint targets from rest to rest with what is held; None if no path was found.
 
-    Through free space; from under a roof, where there is little room, at first back as the hand came.
+    Through free space; from under a roof, where there is little room, at first back as the hand came; what is `pressed`
+    for a path passes all else nearer in the end.
     """
     free = planner.free_path(start, goal, attached.query())
     if free is not None:
@@ -182,7 +185,7 @@ def transport_path(
         free = planner.free_path(pull[-1], goal, attached.query())
         if free is not None:
             return np.concatenate([pull, free])
-    return None
+    return planner.free_path(start, goal, attached.query(), near=True) if pressed else None
 
 
 def equivalent_poses(

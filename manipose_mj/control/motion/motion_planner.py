@@ -25,6 +25,8 @@ _CHECK_EVERY = 4
 _CHECK_RESOLUTION = 0.02  # of free paths, in any joint [rad]
 # From its support on which an attached object must be free [m].
 _SUPPORT_DISTANCE = 0.02
+# On a way, and once its corners are rounded; the widest that both ends allow.
+_CLEARANCES = ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING))
 _EXCUSED = 0.001  # how much deeper a robot may be than at the start, in what it starts in [m]
 _SPEED_SHARES = (1.0, 0.5, 0.25)
 _TIMING = Timing()
@@ -122,6 +124,7 @@ class MotionPlanner:
         query: CollisionQuery | None = None,
         *,
         tight: bool = False,
+        near: bool = False,
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
@@ -132,13 +135,14 @@ class MotionPlanner:
           goal: Another; it must have room around it, unless it may be `tight`.
           query: What to assume; clearances are chosen here.
           tight: See `goal`.
+          near: Pass all else as near as at rounded corners.
         """
         query = query or CollisionQuery()
         if self.collides(goal, query.keeping(GRAZING if tight else TRANSIT)):
             return None
         if self._is_here(start) and self.collides(start, query.keeping(GRAZING)):
             query = self.excusing(start, query.keeping(GRAZING))
-        for wide, close in ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING)):
+        for wide, close in _CLEARANCES[1:] if near else _CLEARANCES:
             widely = query.keeping(wide)
             if self.collides(start, widely) or (tight and self.collides(goal, widely)):
                 continue
