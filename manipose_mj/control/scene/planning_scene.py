@@ -12,9 +12,7 @@ from manipose_mj.control.scene.collision_model import CollisionModel, Contacts, 
 from manipose_mj.control.scene.collision_query import CollisionQuery
 from manipose_mj.poses import pose_to_vector, vector_to_pose
 
-_HARDLY = (
-    1e-6  # how deep the robot counts as being in what it is too close to and does not touch [m]
-)
+_HARDLY = 1e-6  # how deep the robot counts as being in what it is too close to, untouched [m]
 
 
 @dataclass(frozen=True)
