@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -28,7 +29,7 @@ _SEEN = 0.75  # share of the points that has to be seen at best: some are hidden
 _HIDDEN = (
     0.5  # a point that nobody can see counts as so far, as a share of what is far: it tells nothing
 )
-_MOST = 300
+_MOST, _FEWEST_LOOKS = 300, 20
 # Openings of doors below this are measured by how far points are before the front [rad]; how far from a panel's edges, and
 # before the front, they are looked for [m]; from which share of the longest lever on; how many there have to be, and which
 # share of what is seen there.
@@ -61,9 +62,10 @@ def found_opening(
       tree: Of the points, where several parts are looked for among them.
       touched: Whether the hand held or pushed it. What it did not is where it was, if it fits there.
     """
-    if len(part.looks) < 20 or len(points) < 50:
+    if len(part.looks) < _FEWEST_LOOKS or len(points) < 50:
         return part.opening
-    misfit = _misfits(part, cKDTree(points) if tree is None else tree, hidden)
+    tree = cKDTree(points) if tree is None else tree
+    misfit = _misfits(part, tree, hidden)
     if not touched and misfit(part.opening) < _FITS:
         return part.opening
     kind = part.part.joint.kind
@@ -75,8 +77,10 @@ def found_opening(
     best = min(tried, key=misfit)
     near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()
     best = min([best, *near], key=misfit)
-    if misfit(best) > _BETTER * misfit(part.opening):
-        best = part.opening
+    # What stands still by a hinge may be taken for the door: what moves most has to agree.
+    for each in (misfit, _misfits(replace(part, looks=_moving_most(part)), tree, hidden)):
+        if each(best) > _BETTER * each(part.opening):
+            best = part.opening
     if kind == "hinge" and best < _NEARLY_SHUT:
         tilt = _tilt(part, points)
         best = best if tilt is None else tilt
@@ -106,6 +110,16 @@ def _misfits(part: PartModel, tree: cKDTree, hidden: Hidden | None) -> Callable[
         return float(nearest[: max(int(_SEEN * len(nearest)), 1)].mean())
 
     return lambda opening: min(off(transform(part.motion(opening), side)) for side in sides)
+
+
+def _moving_most(part: PartModel) -> Float[np.ndarray, "n 3"]:
+    """The looks that are far from the joint's axis; all of what slides."""
+    joint, looks = part.part.joint, part.looks
+    if joint.kind == "slide":
+        return looks
+    lever = np.linalg.norm(np.cross(joint.axis, looks - joint.origin), axis=1)
+    far = looks[lever > _FAR_FROM_HINGE * lever.max()]
+    return far if len(far) >= _FEWEST_LOOKS else looks
 
 
 def _tilt(part: PartModel, points: Float[np.ndarray, "n 3"]) -> float | None:

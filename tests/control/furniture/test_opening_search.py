@@ -16,7 +16,7 @@ from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import handle_label
-from manipose_mj.poses import compose, transform
+from manipose_mj.poses import compose, invert, transform
 
 FRONT = 0.2
 PANEL = np.array([[0.18, -0.2, 0.1], [FRONT, 0.2, 0.25]])
@@ -65,6 +65,23 @@ def test_an_opening_is_found_near_where_the_hand_left_the_part(kind, truth, off,
     part = a_part(kind)
     points = transform(part.motion(truth), part.looks)
     assert found_opening(part.at(truth + off), points) == pytest.approx(truth, abs=most)
+
+
+@pytest.mark.parametrize(("truth", "left", "before"), [(0.0, 0.0, 1.2), (1.2, 1.2, 0.0)])
+def test_what_stands_still_by_the_hinge_does_not_keep_a_door_where_it_was(truth, left, before):
+    part = a_part("hinge")
+    still = plane([FRONT, -0.2, 0.1], [FRONT + 0.06, -0.19, 0.25], 0.003)
+    taken_for_it = transform(invert(part.motion(1.2)), still)
+    own = part.looks[:: max(1, round(3 * len(part.looks) / len(still)))]
+    assert len(own) < 0.4 * len(still)
+    polluted = replace(part, looks=np.concatenate([taken_for_it, own])[_shuffled(still, own)])
+    points = np.concatenate([transform(part.motion(truth), part.looks), still])
+    found = found_opening(polluted.at(left), points, before=before)
+    assert found == pytest.approx(truth, abs=0.06)
+
+
+def _shuffled(*parts: np.ndarray) -> np.ndarray:
+    return np.random.default_rng(0).permutation(sum(map(len, parts)))
 
 
 @pytest.mark.parametrize(("assumed", "found"), [(0.302, 0.302), (0.27, 0.30), (0.0, 0.30)])
