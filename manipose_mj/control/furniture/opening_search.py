@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -65,7 +66,7 @@ def found_opening(
     if len(part.looks) < _FEWEST_LOOKS or len(points) < 50:
         return part.opening
     tree = cKDTree(points) if tree is None else tree
-    misfit = _misfits(part, tree, hidden)
+    misfit = cache(_misfits(part, tree, hidden))
     if not touched and misfit(part.opening) < _FITS:
         return part.opening
     kind = part.part.joint.kind
@@ -77,8 +78,11 @@ def found_opening(
     best = min(tried, key=misfit)
     near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()
     best = min([best, *near], key=misfit)
-    # What stands still by a hinge may be taken for the door: what moves most has to agree.
-    for each in (misfit, _misfits(replace(part, looks=_moving_most(part)), tree, hidden)):
+    measures: list[Callable[[float], float]] = [misfit]
+    if kind == "hinge":
+        # What stands still by a hinge may be taken for the door: what moves most has to agree.
+        measures.append(_misfits(replace(part, looks=_moving_most(part)), tree, hidden))
+    for each in measures:
         if each(best) > _BETTER * each(part.opening):
             best = part.opening
     if kind == "hinge" and best < _NEARLY_SHUT:
@@ -113,10 +117,8 @@ def _misfits(part: PartModel, tree: cKDTree, hidden: Hidden | None) -> Callable[
 
 
 def _moving_most(part: PartModel) -> Float[np.ndarray, "n 3"]:
-    """The looks that are far from the joint's axis; all of what slides."""
+    """The looks that are far from a hinge's axis."""
     joint, looks = part.part.joint, part.looks
-    if joint.kind == "slide":
-        return looks
     lever = np.linalg.norm(np.cross(joint.axis, looks - joint.origin), axis=1)
     far = looks[lever > _FAR_FROM_HINGE * lever.max()]
     return far if len(far) >= _FEWEST_LOOKS else looks

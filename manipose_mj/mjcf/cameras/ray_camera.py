@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.ray_casting import RayBundles, bundle_rays, cast_rays
+from manipose_mj.mjcf.cameras.ray_memory import RayMemory
 from manipose_mj.poses import compose
 
 
@@ -75,20 +76,28 @@ class RayCamera:
                 f"camera size {self.height} x {self.width}: height and width must be positive"
             )
 
-    def render(self, model: mujoco.MjModel, data: mujoco.MjData, camera: int | str) -> RayImage:
+    def render(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        camera: int | str,
+        memory: RayMemory | None = None,
+    ) -> RayImage:
         """Depth, segmentation and normals.
 
         Args:
           model: The compiled model.
           data: Its state after `mj_forward` (or a step).
           camera: Name or id.
+          memory: Of this camera's pictures: quicker where most of what it sees stands still.
 
         Raises:
           InputError: No such camera, or it is orthographic.
         """
         camera = camera_id(model, camera)
         bundles = image_rays(camera_intrinsics(model, camera, self.height, self.width))
-        hits = cast_rays(model, data, camera_pose(model, data, camera), bundles)
+        cast = cast_rays if memory is None else memory.cast
+        hits = cast(model, data, camera_pose(model, data, camera), bundles)
         shape = (self.height, self.width)
         far = float(model.vis.map.zfar * model.stat.extent)
         hits = hits.within(far)

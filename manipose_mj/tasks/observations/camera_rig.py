@@ -24,6 +24,7 @@ from manipose_mj.mjcf.cameras.ray_camera import (
     camera_pose,
 )
 from manipose_mj.mjcf.cameras.ray_casting import VISIBLE_GROUPS, rotated
+from manipose_mj.mjcf.cameras.ray_memory import RayMemory
 from manipose_mj.mjcf.cameras.ray_picture import RayShading
 from manipose_mj.mjcf.cameras.surface_colours import SurfaceColours, to_display
 from manipose_mj.tasks.observations.sensor_config import CameraView, SensorConfig
@@ -95,6 +96,7 @@ class CameraRig:
             elif camera not in known:
                 raise unknown_name("camera", camera, known)
         self._camera = RayCamera(config.height, config.width)
+        self._memories: dict[str, RayMemory] = {}
         self._cache = StepCache()
         self._owners: Int[np.ndarray, "ngeom"] | None = None
         self._painter: Painter | None = None
@@ -115,6 +117,7 @@ class CameraRig:
     def forget(self, seed: int) -> None:
         """Drop what was rendered, and draw noise from this seed from now on."""
         self._cache.forget()
+        self._memories.clear()
         self._owners = None
         self._seed = seed
 
@@ -176,7 +179,8 @@ class CameraRig:
     def _measured(self, physics: mjcf.Physics, camera: str) -> Frame:
         model, data = physics.model.ptr, physics.data.ptr
         index = camera_id(model, camera)
-        exact = self._camera.render(model, data, index)
+        memory = self._memories.setdefault(camera, RayMemory())
+        exact = self._camera.render(model, data, index, memory)
         if self._owners is None:
             self._owners = geom_instances(model, self._bodies(physics)) + 1
         # What has no instance, and what is nothing, is 0.
