@@ -23,6 +23,7 @@ _UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estim
 # The same of what lies over the table's edge: it sinks between the fingers.
 _FROM_BELOW_LETTING_GO = (MAX_OPENING, 0.055, 0.04, 0.025)
 _GIVING_WAY = (0.006, 0.012)
+_LOST = 0.01  # what is further from the hand has fallen from it [m]
 
 
 def opening_to_let_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:
@@ -65,4 +66,7 @@ def retreat_from(
         line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
         if line is not None:
             return line
+    near_by = CollisionQuery(replace(CONTACT, arm=-np.inf, target=_LOST), target=released.geoms)
+    if name in estimate.objects and not planner.collides(estimate.joints, near_by):
+        return estimate.joints[None]  # there is nothing to back off from
     raise StageFailure("release", f"no way to back off from {name}")

@@ -59,6 +59,8 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
         for part in lost:
             part.find_handle(shut, points, normals)
         shut += [twin for part in shut if (twin := part.twin(shut, points, normals))]
+        for part in tuple(shut):
+            shut += part.column(shut, points, normals)
         for part in shut:
             part.turn_as_doors_do(shut, bounds, points, normals)
     if any(part.opening == 0.0 for part in shut):

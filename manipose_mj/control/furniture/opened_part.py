@@ -21,6 +21,7 @@ _TELLING = {"slide": 0.10, "hinge": 0.7}
 _PLANE = 0.010  # how far points of a panel are from its plane [m]
 # Of a door from its front, backwards and forwards [m]; share of a door's sides that has to show to tell them.
 _DOOR_PLANE, _MOST_OF_DOOR = (0.05, 0.02), 0.7
+_RARE = 5.0  # percentage of the points of its inside that may be further out
 _AT_HINGE = 0.04  # a side that is no further from the hinge is the hinge's [m]
 _BEYOND = 0.08  # by how much a panel may be larger than was guessed [m]
 _FLAT, _FACING = 0.8, 0.75  # cosines of normals to an axis
@@ -210,7 +211,7 @@ def _door(
 def _door_panel(
     part: PartModel, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "2 3"]:
-    """Where a door that is open ends, from the points of either side of it."""
+    """Where a door that is open ends, from the points of either side of it, and how thick it is, from those of its inside."""
     back = invert(part.motion(part.opening))
     shut, turned = transform(back, points), normals @ back[:3, :3].T
     low, high = part.panel
@@ -219,13 +220,17 @@ def _door_panel(
     on &= ((shut > low - _PLANE) & (shut < high + _PLANE))[:, 1:].all(axis=1)
     if on.sum() < 8 * _LEAST:
         return part.panel
+    panel = part.panel.copy()
+    inside = shut[on & (turned[:, 0] < 0), 0]
+    if len(inside) >= _LEAST:
+        panel[0, 0] = min(low[0], float(np.percentile(inside, _RARE)))
     ends = np.percentile(shut[on, 1:], [0.7, 99.3], axis=0)
     if (np.ptp(ends, axis=0) < _MOST_OF_DOOR * (high - low)[1:]).any():
-        return part.panel  # something hides much of it
+        return panel  # something hides much of it
     # On the side of the hinge the body bleeds into it.
     hinge = np.abs(part.panel[:, 1:] - part.part.joint.origin[1:]) < _AT_HINGE
     across = np.abs(part.part.joint.axis[1:]) < _FACING
-    return np.column_stack([part.panel[:, 0], np.where(hinge & across, part.panel[:, 1:], ends)])
+    return np.column_stack([panel[:, 0], np.where(hinge & across, panel[:, 1:], ends)])
 
 
 def _measured_panel(

@@ -18,8 +18,9 @@ _UNSURE = 1.0  # what no confidence costs, in places
 _LEAST = (0.25, 0.1, 0.0)  # confidence of those that words are first compared with, and then
 _FITS = 1.0  # places off, below which words fit
 _SHARE = 2.0  # how many places the whole height, or width, counts for
-# Of ovens: what it costs to be a knob, to slide, and to be below, in places; handles that are no shorter are bars [m].
-_KNOB, _SLIDES, _BELOW, _BAR = 1.5, 0.3, 1.0, 0.06
+# Of ovens: what it costs to be a knob, to slide, to be below, and to be short beside another bar, in places; handles
+# that are no shorter are bars [m].
+_KNOB, _SLIDES, _BELOW, _SHORT, _BAR = 1.5, 0.3, 1.0, 1.5, 0.06
 
 
 @dataclass(frozen=True)
@@ -108,15 +109,17 @@ def _cost(
 def _oven_cost(candidates: Sequence[Candidate], candidate: Candidate) -> float:
     """How far a part is from the only door of an oven, in places.
 
-    That has a bar, above what is kept below it; knobs are no handles. A wide, low front says nothing.
+    That has a bar, above what is kept below it; knobs are no handles, nor are a few of them in a row, which seem to be a
+    shorter bar. A wide, low front says nothing.
     """
     bars = [float(_handle(each.part)[2]) for each in candidates if each.length >= _BAR]
+    longest = max(each.length for each in candidates)
     slides = _SLIDES * (candidate.part.joint.kind == "slide")
     if candidate.length < _BAR:
         return _KNOB + slides
     low, high = min(bars), max(bars)
     above = (float(_handle(candidate.part)[2]) - low) / (high - low) if high > low else 1.0
-    return slides + _BELOW * (1 - above)
+    return slides + _BELOW * (1 - above) + _SHORT * (1 - candidate.length / longest)
 
 
 def _place_cost(

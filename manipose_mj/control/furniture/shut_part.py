@@ -16,7 +16,7 @@ from manipose_mj.control.furniture.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
-from manipose_mj.control.furniture.shapes.standing_out import nearest_of, twin_of
+from manipose_mj.control.furniture.shapes.standing_out import column_of, nearest_of, twin_of
 from manipose_mj.poses import compose, invert, transform
 
 FACING = 0.6  # cosine between normals of the front and X, at least
@@ -31,8 +31,9 @@ _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
 _OUT = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _LONG = 1.5  # times as long as wide: a bar
-# Of the other one of double doors: how near a handle that was sensed would be it [m], its share of the confidence.
+# Of handles that look like a sensed one: how near another that was sensed would be it [m], their share of the confidence.
 _KNOWN, _TWIN = 0.04, 0.8
+_SURE = 0.25  # confidence of drawers that tell of others in their column
 
 
 class ShutPart:
@@ -129,6 +130,34 @@ class ShutPart:
         twin.origin[1] = self.handle[1, 3] + place[1] - self.origin[1]
         twin.axis = self.axis * [-1.0, 1.0, -1.0]
         return twin
+
+    def column(
+        self,
+        others: Sequence[ShutPart],
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+    ) -> list[ShutPart]:
+        """Drawers above and below, where handles like this one's show: those not sensed; the sensed ones get surer."""
+        front = None
+        if self.kind == "slide" and self.opening == 0.0 and self.sensed.confidence >= _SURE:
+            front = panel_place(points, normals, self)
+        if front is None:
+            return []
+        label, seen = handle_label(points, self.handle, front)
+        confidence = self.sensed.confidence * _TWIN
+        found = []
+        for place in column_of(points, label, front) if seen else ():
+            near = [o for o in others if np.linalg.norm(o.handle[:3, 3] - place) < _KNOWN]
+            for other in near:
+                if other.kind == "slide":
+                    surer = max(other.sensed.confidence, confidence)
+                    other.sensed = replace(other.sensed, confidence=surer)
+            if not near:
+                drawer = ShutPart(replace(self.sensed, confidence=confidence), self.pose)
+                drawer.origin = self.origin + place - self.handle[:3, 3]
+                drawer.handle, drawer.half = compose(self.handle[:3, :3], place), self.half
+                found.append(drawer)
+        return found
 
     def turn_as_doors_do(
         self,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
 from manipose_mj.poses import compose, rotation_about, transform
-from tests.control.furniture.synthetic import FRONT, HALF, body, cloud, door, rectangle
+from tests.control.furniture.synthetic import FRONT, HALF, HEIGHT, body, cloud, door, rectangle
 
 X, Y, Z = np.eye(3)
 
@@ -167,3 +169,44 @@ def test_a_bar_that_was_sensed_askew_is_level_or_upright():
     assert label is not None
     np.testing.assert_allclose(label.rotation, UP_FRONT, atol=1e-6)
     assert label.extents[0] == pytest.approx(0.12, abs=0.01)
+
+
+def bar(height: float, middle: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A level one, before the front."""
+    return rectangle(
+        np.array([FRONT + 0.03, middle - 0.06, height - 0.006]), 0.12 * Y, 0.012 * Z, X
+    )
+
+
+@pytest.fixture
+def drawer() -> SensedPart:
+    return sensed("slide", [0.0, 0.0, 0.0], handle=level(0.25))
+
+
+def level(height: float) -> np.ndarray:
+    """A level handle before the front, `T_world_handle`."""
+    return compose(ACROSS_FRONT, np.array([FRONT + 0.03, 0.0, height]))
+
+
+def test_drawers_of_a_column_are_found_by_the_handle_of_one(drawer):
+    unsure = replace(drawer, handle=level(0.10), confidence=0.1)
+    bars = [bar(0.10), bar(0.25), bar(0.40)]
+    model = fit_furniture(cloud([*body(), *bars]), SensedFurniture(X, (drawer, unsure)), "cabinet")
+    heights = sorted(
+        (transform(model.pose, found.part.handle.origin[None])[0, 2], found.confidence)
+        for found in model.parts
+        if found.part.handle
+    )
+    assert [height for height, _ in heights] == pytest.approx([0.10, 0.25, 0.40], abs=0.01)
+    # Those that look like it are nearly as sure.
+    assert [confidence for _, confidence in heights] == pytest.approx([0.4, 0.5, 0.4])
+
+
+def test_what_is_beside_the_column_longer_or_without_a_front_around_it_is_no_drawer_of_it(drawer):
+    moulding = rectangle(np.array([FRONT + 0.03, -HALF, 0.40]), 2 * HALF * Y, 0.012 * Z, X)
+    for other in (bar(0.40, 0.15), moulding, bar(HEIGHT + 0.05)):
+        found = cloud([*body(), bar(0.25), other])
+        assert len(fit_furniture(found, SensedFurniture(X, (drawer,)), "cabinet").parts) == 1
+    column = cloud([*body(), bar(0.25), bar(0.40)])
+    unsure = replace(drawer, confidence=0.2)
+    assert len(fit_furniture(column, SensedFurniture(X, (unsure,)), "cabinet").parts) == 1

@@ -9,11 +9,11 @@ import pytest
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.opened_part import reaching_unseen, with_extra
+from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import transform
-from tests.control.furniture.synthetic import FRONT, HALF, HEIGHT, body, cloud, door
+from tests.control.furniture.synthetic import FRONT, HALF, HEIGHT, THICKNESS, body, cloud, door
 
 X, Y, Z = np.eye(3)
 SOLID = np.array([[[-FRONT, -HALF, 0.0], [FRONT, HALF, HEIGHT]]])
@@ -38,6 +38,17 @@ def test_the_hand_keeps_clear_of_all_that_is_seen_on_a_door():
     assert low[1] > -HALF / 2
     # All of it moves with the door: nothing of the body is among it.
     assert len(with_extra(MODEL, replace(DOOR, panel=PANEL), cloud(body())).extra) == 0
+
+
+@pytest.mark.parametrize("thickness", [0.03, 0.045])
+def test_an_open_door_is_as_thick_as_it_shows(thickness):
+    outer, bar, inner = door(-HALF, 1.3, "outer inner")
+    deeper = DOOR.motion(1.3)[:3, :3] @ X * (thickness - THICKNESS)
+    seen = seen_open(MODEL, DOOR, cloud([*body(), outer, bar, (inner[0] - deeper, inner[1])]))
+    assert np.ptp(seen.panel[:, 0]) == pytest.approx(thickness, abs=0.004)
+    # Whose inside does not show keeps its thickness.
+    unseen = seen_open(MODEL, DOOR, cloud([*body(), outer, bar]))
+    assert unseen.panel[0, 0] == PANEL[0, 0]
 
 
 def _holed_front():

@@ -87,5 +87,10 @@ def test_the_door_of_an_oven_is_above_a_drawer_and_below_its_knobs():
     knob = Candidate(part("knob", 0.3, 0.9, "hinge"), 0.5, 0.5, 0.6, 0.02)
     assert meant_part("door", [below, above, knob], "oven") == 1
     assert meant_part("door", [knob], "oven") == 0
+    # Two knobs side by side may be taken for a bar, but a short one.
+    row = Candidate(part("row", 0.1, 0.9, "hinge"), 0.5, 0.4, 0.6, 0.12)
+    bar = Candidate(part("bar", 0.0, 0.7, "hinge"), 0.6, 0.0, 0.3, 0.45)
+    assert meant_part("door", [bar, row], "oven") == 0
+    assert meant_part("door", [row, below, bar], "oven") == 2
     # In a cupboard a wide, low front is a drawer's, wherever it is.
     assert meant_part("door", [below, above], "cabinet") == 0

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manipose_mj.control.execution import letting_go
+from manipose_mj.control.execution.letting_go import retreat_from
 from manipose_mj.control.grasping.retreat import RETREATS, retreat
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.scene.collision_query import CONTACT, GRAZING, TRANSIT, CollisionQuery
+from manipose_mj.failures import StageFailure
 
 _AT = np.array([0.3, 0.4, 0.30])  # of the TCP; the can stands below
 _BESIDE = np.array([0.02, 0.02, 0.0])  # the can is beneath a finger [m]
@@ -88,3 +91,12 @@ def test_a_hand_that_touches_nothing_is_excused_for_nothing(let_go):
     assert excused.depths is not None and not excused.depths.any()
     closer = let_go(0.010)[0]
     assert closer.collides(estimate.joints, excused)
+
+
+def test_what_has_fallen_from_the_hand_needs_no_way_back(let_go, monkeypatch):
+    monkeypatch.setattr(letting_go, "retreat", lambda *args: None)
+    planner, estimate, can = let_go(0.0)
+    with pytest.raises(StageFailure, match="no way to back off"):
+        retreat_from(planner, estimate, can.name)
+    planner, estimate, can = let_go(-0.2)
+    np.testing.assert_array_equal(retreat_from(planner, estimate, can.name), estimate.joints[None])

@@ -1,4 +1,4 @@
-"""What stands out of a front as handles do: the other one of a pair, and one near where none was."""
+"""What stands out of a front as handles do: the other one of a pair, those of a column, and one near where none was."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ _FAR, _CELL, _IN_CELL = 0.40, 0.008, 2
 _OUT = 0.008  # how far it stands out, at least [m]
 _LONGEST, _WIDEST = 0.35, 0.06
 _AROUND, _FLUSH, _SIDES = 0.025, 0.008, 3
+_SIDES_OF_BAR = 2  # of a level bar, whose ends are beside little of the front
 
 
 def twin_of(
@@ -43,7 +44,8 @@ def twin_of(
     if own.sum() < _FEW:
         return None
     beside = [
-        _run(local, row & (np.sign(local[:, 1]) == side) & ~own, side) for side in (-1.0, 1.0)
+        _run(side * local[:, 1], row & (np.sign(local[:, 1]) == side) & ~own)
+        for side in (-1.0, 1.0)
     ]
     twins = [local[on] for on in beside if _alike(local[own], local[on])]
     if not twins:
@@ -51,6 +53,38 @@ def twin_of(
     middles = [(twin.min(axis=0) + twin.max(axis=0)) / 2 for twin in twins]
     nearest = min(middles, key=lambda middle: abs(middle[1]))
     return handle.origin + np.array([0.0, nearest[1], 0.0])
+
+
+def column_of(
+    points: Float[np.ndarray, "n 3"], handle: PoseLabel, front: float
+) -> list[Float[np.ndarray, "3"]]:
+    """Where other handles of the same size stand out of the front above and below one.
+
+    Args:
+      points: Of the furniture, object frame, X out of the front and Z up [m].
+      handle: Of a shut part, object frame.
+      front: Of it, along X [m].
+    """
+    half = np.abs(handle.rotation) @ handle.extents / 2
+    local, ahead = points - handle.origin, points[:, 0] - front
+    column = (ahead > _STANDING[0]) & (ahead < _STANDING[1])
+    column &= np.abs(local[:, 1]) < half[1] + _AS_WIDE
+    flush = local[np.abs(ahead) < _FLUSH, 1:]
+    own = column & (np.abs(local[:, 2]) < half[2] + _GAP / 2)
+    if own.sum() < _FEW:
+        return []
+    found = []
+    for side in (-1.0, 1.0):
+        away = side * local[:, 2]
+        rest = column & (away > 0) & ~own
+        while (on := _run(away, rest)).any():
+            rest &= away > away[on].max()
+            low, high = local[on].min(axis=0), local[on].max(axis=0)
+            plumb = abs(float(np.median(local[on, 1]) - np.median(local[own, 1]))) < _AS_WIDE / 2
+            alike = plumb and _as_large(local[own], local[on])
+            if alike and _shown_around(flush, low[1:], high[1:]) >= _SIDES_OF_BAR:
+                found.append(handle.origin + np.array([0.0, 0.0, (low[2] + high[2]) / 2]))
+    return found
 
 
 def nearest_of(
@@ -104,11 +138,8 @@ def _shown_around(
     return sides
 
 
-def _run(
-    local: Float[np.ndarray, "n 3"], on: Bool[np.ndarray, "n"], side: float
-) -> Bool[np.ndarray, "n"]:
-    """Of these points, the first run across without a gap that is more than stray points."""
-    away = side * local[:, 1]
+def _run(away: Float[np.ndarray, "n"], on: Bool[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
+    """Of these points, the first run without a gap that is more than stray points, by how far away they are [m]."""
     while on.any():
         first = float(away[on].min())
         _, end = run_around(away[on] - first, _GAP)
@@ -120,9 +151,16 @@ def _run(
 
 
 def _alike(one: Float[np.ndarray, "n 3"], other: Float[np.ndarray, "m 3"]) -> bool:
-    """Whether two sets of points may show two handles of one kind."""
+    """Whether two sets of points may show two handles of one kind, side by side."""
+    if not _as_large(one, other):
+        return False
+    level = abs(float(np.median(other[:, 2]) - np.median(one[:, 2])))
+    return level < _AS_HIGH / 2
+
+
+def _as_large(one: Float[np.ndarray, "n 3"], other: Float[np.ndarray, "m 3"]) -> bool:
+    """Whether the second set of points shows as much, as wide and as high as the first."""
     if len(other) < max(_FEW, _AS_MANY * len(one)):
         return False
     differ = np.abs(np.ptp(other, axis=0) - np.ptp(one, axis=0))
-    level = abs(float(np.median(other[:, 2]) - np.median(one[:, 2])))
-    return bool(differ[1] < _AS_WIDE and differ[2] < _AS_HIGH and level < _AS_HIGH / 2)
+    return bool(differ[1] < _AS_WIDE and differ[2] < _AS_HIGH)
