@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from manipose_mj.control.planning.cavity_places import poses_in_cavity
 from manipose_mj.control.planning.check import PlanState
-from manipose_mj.control.planning.plan_articulated import poses_in_area, poses_in_cavity
+from manipose_mj.control.planning.plan_articulated import poses_in_area
 from manipose_mj.control.planning.regrasp import Poses
 from manipose_mj.control.planning.table_places import poses_with_rotation
 from manipose_mj.control.planning.transport import destinations as rest_destinations

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.perception.pose_sources import make_perception
-from manipose_mj.control.planning.plan_articulated import poses_in_cavity
+from manipose_mj.control.planning.cavity_places import poses_in_cavity
 from manipose_mj.control.planning.table_places import resting_rotation
 
 

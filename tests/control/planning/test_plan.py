@@ -12,8 +12,8 @@ import pytest
 from manipose_mj.assets.asset import Cavity, GraspSet
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.planning.cavity_places import poses_in_cavity
 from manipose_mj.control.planning.plan import Step, plan_from_json, plan_schema, plan_to_json
-from manipose_mj.control.planning.plan_articulated import poses_in_cavity
 from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
