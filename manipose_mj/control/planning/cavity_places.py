@@ -40,7 +40,12 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def poses_in_cavity(
-    obj: ObjectEstimate, part: PartEstimate, opening: float, estimate: SceneEstimate | None = None
+    obj: ObjectEstimate,
+    part: PartEstimate,
+    opening: float,
+    estimate: SceneEstimate | None = None,
+    *,
+    others: bool = False,
 ) -> Poses:
     """Label poses in which the object's bounding box rests on the cavity's floor and fits it.
 
@@ -49,6 +54,8 @@ def poses_in_cavity(
       part: The drawer or door.
       opening: Joint position while the object is put in [m or rad].
       estimate: What else there is; what lies in the cavity is kept clear of.
+      others: Of an object that fits in some orientation, those in which it fits if it is smaller than its estimate, by
+        what that is uncertain by.
 
     Returns:
       `T_world_label`: those first that keep the side that is down now, then lying ones, which are
@@ -77,11 +84,14 @@ def poses_in_cavity(
     if estimate is not None and not any((reach <= room).all() for _, reach in boxes):
         # A box around a box that is tilted is larger than one around what tapers.
         boxes = [obj.box_around(estimate.scene, rotation) for rotation in rotations]
-    if obj.uncertainty > 0 and not any((reach <= room).all() for _, reach in boxes):
+    fit = [bool((reach <= room).all()) for _, reach in boxes]
+    if others and not any(fit):
+        return ()  # they are found without
+    if obj.uncertainty > 0 and (others or not any(fit)):
         room = room + obj.uncertainty  # it may be that much smaller
-    for rotation, (middle, reach) in zip(rotations, boxes, strict=True):
+    for rotation, (middle, reach), fits in zip(rotations, boxes, fit, strict=True):
         slack = room - reach
-        if (slack < 0).any():
+        if (slack < 0).any() or (others and fits):
             continue
         height = resting_height(obj, rotation) if obj.rests else reach[2]
         floor = np.array([0.0, 0.0, height + DROP_HEIGHT - cavity.extents[2] / 2])

@@ -161,6 +161,10 @@ def _plans_through(
     by_then = with_part_at(planner.scene, part, max(wide_open, part.opening))
     for stops in routes(planner.within(by_then), estimate, obj, poses):
         yield opening + place_at_each(goal.object, stops)
+    if isinstance(goal, InsideGoal):
+        tight = poses_in_cavity(obj, part, wide_open, estimate, others=True)
+        if tight:
+            yield opening + place_at_each(goal.object, (tight,))
 
 
 def opening_to_pass(part: PartEstimate) -> float:

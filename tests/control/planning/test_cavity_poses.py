@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.perception.pose_sources import make_perception
-from manipose_mj.control.planning.cavity_places import poses_in_cavity
+from manipose_mj.control.planning.cavity_places import CAVITY_MARGIN, poses_in_cavity
 from manipose_mj.control.planning.table_places import resting_rotation
 
 
@@ -46,3 +46,25 @@ def test_a_box_too_large_for_the_cavity_gives_way_to_the_shape(estimate, can):
     for pose in found:
         down = carrier[:3, :3].T @ pose[:3, :3]
         assert abs(down[2, 0]) < 0.5
+
+
+def test_what_an_uncertain_object_may_fit_as_well_is_told_apart(estimate, can):
+    drawer = estimate.parts["middle_drawer"]
+    opening = drawer.joint.range[1]
+    assert drawer.cavity is not None
+    # Room for the can to lie, and 2 mm too little for it to stand.
+    height = can.label.extents[0] + CAVITY_MARGIN[2] - 0.002
+    part = replace(drawer, cavity=replace(drawer.cavity, extents=np.array([0.4, 0.4, height])))
+
+    def standing(poses):
+        return [abs(pose[2, 0]) > 0.9 for pose in poses]
+
+    unsure = replace(can, uncertainty=0.003)
+    assert not any(standing(poses_in_cavity(unsure, part, opening, estimate)))
+    as_well = standing(poses_in_cavity(unsure, part, opening, estimate, others=True))
+    assert as_well and all(as_well)
+    assert not poses_in_cavity(can, part, opening, estimate, others=True)
+    # Where it fits in no other way, these are all there are.
+    tall = replace(part, cavity=replace(part.cavity, extents=np.array([0.09, 0.09, height])))
+    assert all(standing(poses_in_cavity(unsure, tall, opening, estimate)))
+    assert not poses_in_cavity(unsure, tall, opening, estimate, others=True)
