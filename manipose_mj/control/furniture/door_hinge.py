@@ -17,6 +17,7 @@ _STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at l
 _ACROSS, _UPRIGHT = 0.3, 0.5
 _WIDE = 0.5  # of the panel's width, from which on a level bar is a flap's
 _AT_EDGE = 0.25  # how far from an edge of the panel an upright hinge may be, of the panel's width
+_INWARDS = 0.02  # how much a handle goes into the body at most as its door opens [m/rad]
 _CORNER = 0.6  # across: beyond it no flap has its handle
 # Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
 # of the handle, and a gap that ends it [m], wider than the shadow of a handle; points that tell.
@@ -44,10 +45,12 @@ def can_be_a_door(
     handle: Float[np.ndarray, "4 4"],
     panel: Float[np.ndarray, "2 3"],
 ) -> bool:
-    """Whether a hinge is upright near an edge of the panel, or level with the handle in the middle.
+    """Whether a hinge is upright near an edge of the panel, or level with the handle in the middle, and opens outwards.
 
     All in the object frame, as of `likely_hinge`.
     """
+    if np.cross(axis, handle[:3, 3] - origin)[0] < -_INWARDS:
+        return False
     if abs(axis[1]) > _STRAIGHT:
         return abs(float(_away(handle, panel)[1])) < _CORNER
     width = float(np.ptp(panel[:, 1]))

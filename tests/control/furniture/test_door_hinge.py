@@ -43,6 +43,9 @@ def test_a_door_turns_about_the_edge_that_is_farthest_from_its_handle(
         (X, 0.0, (0.07, 0.4), False),  # a knob's
         (-Z, -0.29, (0.07, 0.4), True),
         (-Z, -0.1, (0.07, 0.4), False),  # in the middle of its panel
+        (Z, -0.29, (0.07, 0.4), False),  # it would open into the body
+        (Z, -0.29, (-0.28, 0.4), True),  # its handle is at the hinge, which says nothing
+        (-Y, 0.0, (-0.1, 0.57), False),
         (Y, 0.0, (-0.1, 0.57), True),
         (Y, 0.0, (0.07, 0.57), False),  # no flap has its handle in a corner
         (np.array([0.5, 0.0, 0.85]), -0.29, (0.07, 0.4), False),
