@@ -17,6 +17,7 @@ from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
+from manipose_mj.control.furniture.scene_cloud import SceneViews
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.camera_rig import (
     FRONT_CAMERAS,
@@ -26,6 +27,7 @@ from manipose_mj.control.perception.camera_rig import (
 )
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
+from manipose_mj.control.perception.in_hand import InHand, unless_gone
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
 from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
@@ -56,10 +58,7 @@ _TRUSTED = 0.8  # confidence under which all cameras are asked before an estimat
 _FITS = (1.25, 0.0005)  # misfit allowed later, of the first: a factor, and so much more [m]
 _MORE = 1.5  # times the points that a shape was found by, from which on it is found anew
 _BETTER = 0.9  # of what is left of the weighed misfit, for another pose to replace it
-# How far what fingers hold may turn out to be from where they should have it [m, rad], and by how much they close when
-# they lose it: [m], and as a share of its width.
-_IN_HAND = (0.03, 0.5)
-_LOST, _LOST_SHARE = 0.004, 0.5
+_IN_HAND = (0.03, 0.5)  # how far what fingers hold may be from where they should have it [m, rad]
 
 
 class EstimatedPerception:
@@ -101,10 +100,11 @@ class EstimatedPerception:
         self._more_views = ObjectViews(task.task_observables, names)
         self.looks_by_hand = HAND_CAMERA in sensors.camera_names
         self._close_views = ObjectViews(task.task_observables, sensors.camera_names)
+        self._sights = SceneViews(task.task_observables, usual)
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, Callable[[], GraspSet]] = {}
-        self._held: tuple[str, Float[np.ndarray, "4 4"]] | None = None
-        self._held_width = 0.0  # of the gripper then [m]
+        self._held: InHand | None = None
+        self._seen: dict[str, SensedPose] = {}  # where what is known showed last
         # Objects that lie otherwise than their grasps were made for.
         self._dropped: set[str] = set()
         self._time = self._looked = -1.0
@@ -124,7 +124,8 @@ class EstimatedPerception:
           InputError: There are no weights for a category or its type.
         """
         self._keys = random_keys(seed)
-        self._held, self._known, self._grasps, self._dropped = None, {}, {}, set()
+        self._held, self._dropped = None, set()
+        self._known, self._seen, self._grasps = {}, {}, {}
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
@@ -157,16 +158,15 @@ class EstimatedPerception:
     @property
     def _uncertain(self) -> tuple[str, ...]:
         """What is estimated with a confidence that does not last, and not in the hand."""
-        held = None if self._held is None else self._held[0]
         known = self._known.items()
-        return tuple(name for name, s in known if s.confidence < _SURE and name != held)
+        return tuple(n for n, s in known if s.confidence < _SURE and n != self._held_name)
 
     @property
     def _outgrown(self) -> tuple[str, ...]:
         """What goals are about, sure, not in the hand, and seen by many more points than its shape was found by."""
-        held = {self._held[0]} if self._held is not None else set()
         found = []
-        for name in sorted((self._needed & self._known.keys()) - held - set(self._uncertain)):
+        others = {self._held_name, *self._uncertain}
+        for name in sorted((self._needed & self._known.keys()) - others):
             seen = sum(len(view) for view in self._views.of(self._physics, name))
             if seen > _MORE * self._known[name].points:
                 found.append(name)
@@ -212,7 +212,7 @@ class EstimatedPerception:
         for name in sorted(self._enclosed):
             sensed = self._looked_at(name, self._close_views)
             if sensed is not None:
-                self._known[name] = sensed
+                self._known[name] = self._seen[name] = sensed
                 self._grasps[name] = self._grasps_of(name, self._close_views)
         self._build()
 
@@ -241,6 +241,7 @@ class EstimatedPerception:
         for name in self._known:
             if name not in self._grasps:
                 self._grasps[name] = self._grasps_of(name)
+                self._seen[name] = self._known[name]
         self._world.build({name: sensed.shape.hulls for name, sensed in self._known.items()})
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
@@ -256,7 +257,7 @@ class EstimatedPerception:
             self._world.follow(tcp)
             for name in self._known:
                 self._known[name] = self._updated(name, tcp)
-            for name in self._dropped - {None if self._held is None else self._held[0]}:
+            for name in self._dropped - {self._held_name}:
                 self._grasps[name] = self._grasps_of(name)
                 self._dropped.remove(name)
             self._time = time
@@ -277,8 +278,11 @@ class EstimatedPerception:
         tcp = self._planning_scene().tcp_pose(self.robot()[0])
         self._world.hold(name, tcp)
         if name in self._known:
-            self._held = (name, invert(tcp) @ self._known[name].pose)
-            self._held_width = self.robot()[1]
+            self._held = InHand(name, invert(tcp) @ self._known[name].pose, self.robot()[1])
+
+    @property
+    def _held_name(self) -> str | None:
+        return None if self._held is None else self._held.name
 
     def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """The hand led a part along this path, by `T_world_tcp`; `stopped`: it went no further."""
@@ -298,36 +302,33 @@ class EstimatedPerception:
         return {name: object_kind(entity.asset) for name, entity in self._task.objects.items()}
 
     def _updated(self, name: str, tcp: Float[np.ndarray, "4 4"]) -> SensedPose:
-        """The pose of an object after time has passed: where it was, or where the hand has
-        brought it, if the new views fit that; else what they are estimated to show."""
+        """The pose of an object now: where it was, or the hand has brought it, if new views fit that; else as they show."""
         before = self._known[name]
-        held = self._held is not None and self._held[0] == name
-        if self._held is not None and held:
-            before = replace(before, pose=tcp @ self._held[1])
+        held = self._held if self._held_name == name else None
+        if held is not None:
+            before = replace(before, pose=tcp @ held.pose_tcp)
         views = self._views.of(self._physics, name)
         if sum(len(view) for view in views) < MIN_VIEW_POINTS:
-            return before
+            return unless_gone(before, self._seen[name], lambda: self._sights.sights(self._physics))
         misfit = before.shape.misfit(transform(invert(before.pose), seen_points(views)))
-        factor, more = _FITS
-        if misfit <= factor * before.misfit + more and before.confidence >= _SURE:
+        if misfit <= _FITS[0] * before.misfit + _FITS[1] and before.confidence >= _SURE:
+            self._seen[name] = before
             return before
         sensed = self._sensed(name, views, OneShape(before.shape))
         if sensed is None:
             return before
         if weighed(sensed.misfit, sensed.confidence) > _BETTER * weighed(misfit, before.confidence):
             return before
-        if held and not self._may_be_lost() and not agree(sensed, before, _IN_HAND):
+        jumped = held is not None and not agree(sensed, before, _IN_HAND)
+        if held is not None and jumped and not held.may_be_lost(self.robot()[1]):
             return before
         sensed = replace(sensed, points=before.points)  # the shape is the old one
-        if self._held is not None and held:
-            self._held = (name, invert(tcp) @ sensed.pose)
-            if not agree(sensed, before, _IN_HAND):
+        if held is not None:
+            self._held = replace(held, pose_tcp=invert(tcp) @ sensed.pose)
+            if jumped:
                 self._dropped.add(name)
+        self._seen[name] = sensed
         return sensed
-
-    def _may_be_lost(self) -> bool:
-        """Whether the fingers have closed on what they held: friction lets nothing jump that they are still around."""
-        return self.robot()[1] < self._held_width - min(_LOST, _LOST_SHARE * self._held_width)
 
     def _sensed(
         self,

@@ -129,10 +129,10 @@ def test_what_is_held_follows_the_hand(cup, truth):
     perception.reset(0)
     before = perception.observe()
     perception.hold("object")
-    name, in_hand = perception._held or ("", np.eye(4))
-    assert name == "object"
+    held = perception._held
+    assert held is not None and held.name == "object"
     np.testing.assert_allclose(
-        before.tcp_pose @ in_hand, before.objects["object"].label_pose, atol=1e-9
+        before.tcp_pose @ held.pose_tcp, before.objects["object"].label_pose, atol=1e-9
     )
     perception.hold(None)
     assert perception._held is None
