@@ -19,6 +19,8 @@ _BEYOND = {"slide": 0.04, "hinge": 0.5}  # openings beyond the usual that are lo
 _WITHIN = {"slide": 0.12, "hinge": 0.5}  # from where the hand has left it
 _BETTER = 0.85  # of the misfit that is left, for another opening to replace the present one
 _FITS = 0.003  # misfit up to which a part that nobody touched is where it was [m]
+# Misfit of the best near where it should be, from which on it is looked for elsewhere, and up to which it is there [m].
+_ASTRAY, _FITS_ELSEWHERE = 0.006, 0.004
 _SHUT = {"slide": 0.006, "hinge": 0.03}  # openings below count as shut
 _THICKNESSES = (
     0.010,
@@ -51,6 +53,8 @@ def found_opening(
 ) -> float:
     """The opening [m or rad] near the present one that fits best; the present one where none is clearly better.
 
+    Where none fits near it, one that fits well is taken anywhere.
+
     A door that stands wide open hardly shows; what it shut then looks much like it, shut. And what the arm hides tells
     nothing: a door behind it is not gone.
 
@@ -74,10 +78,18 @@ def found_opening(
     ends = [part.opening, part.opening if before is None else before]
     least = max(min(ends) - _WITHIN[kind], 0.0)
     most = min(part.part.joint.range[1] + _BEYOND[kind], max(ends) + _WITHIN[kind])
-    tried = [*np.arange(least, most, coarse).tolist(), part.opening]
-    best = min(tried, key=misfit)
-    near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()
-    best = min([best, *near], key=misfit)
+
+    def search(low: float, high: float) -> float:
+        tried = [*np.arange(low, high, coarse).tolist(), part.opening]
+        best = min(tried, key=misfit)
+        near = np.arange(max(best - coarse, 0.0), best + coarse + fine / 2, fine).tolist()
+        return min([best, *near], key=misfit)
+
+    best = search(least, most)
+    if misfit(best) > _ASTRAY:
+        # The arm may have swept it anywhere on its way.
+        elsewhere = search(0.0, most)
+        best = elsewhere if misfit(elsewhere) < _FITS_ELSEWHERE else best
     measures: list[Callable[[float], float]] = [misfit]
     if kind == "hinge":
         # What stands still by a hinge may be taken for the door: what moves most has to agree.

@@ -27,8 +27,9 @@ from manipose_mj.control.perception.camera_rig import (
 )
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
-from manipose_mj.control.perception.in_hand import InHand, unless_gone
+from manipose_mj.control.perception.in_hand import InHand, is_gone
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
+from manipose_mj.control.perception.objects.asked_objects import asked_rotations, in_the_open
 from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
 from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
@@ -51,7 +52,7 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstima
 from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert, transform
 from manipose_mj.tasks.core.task import ManipulationTask
-from manipose_mj.tasks.goals import OnTableGoal, PoseGoal, TakenOutGoal
+from manipose_mj.tasks.goals import TakenOutGoal
 
 _SURE = 0.6  # confidence from which on an estimate is kept for as long as it fits what is seen
 _TRUSTED = 0.8  # confidence under which all cameras are asked before an estimate is used
@@ -105,6 +106,7 @@ class EstimatedPerception:
         self._grasps: dict[str, Callable[[], GraspSet]] = {}
         self._held: InHand | None = None
         self._seen: dict[str, SensedPose] = {}  # where what is known showed last
+        self._lost: set[str] = set()  # what was not where the hand should have it
         # Objects that lie otherwise than their grasps were made for.
         self._dropped: set[str] = set()
         self._time = self._looked = -1.0
@@ -124,13 +126,16 @@ class EstimatedPerception:
           InputError: There are no weights for a category or its type.
         """
         self._keys = random_keys(seed)
-        self._held, self._dropped = None, set()
+        self._held, self._dropped, self._lost = None, set(), set()
         self._known, self._seen, self._grasps = {}, {}, {}
         for kind in self._kinds().values():
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
         self._find_objects()
-        if self._covered and not (self._known and self._among_others):
+        among_others = in_the_open(self._task.goals) and not self._task.furniture_masks
+        if self._covered and not (
+            self._known and among_others
+        ):  # these can be moved off what they hide
             raise StageFailure("perception", f"no camera sees enough of {min(self._covered)}")
         self._time = self._looked = float(self._physics.data.time)
         self._build()
@@ -164,26 +169,21 @@ class EstimatedPerception:
     @property
     def _outgrown(self) -> tuple[str, ...]:
         """What goals are about, sure, not in the hand, and seen by many more points than its shape was found by."""
-        found = []
-        others = {self._held_name, *self._uncertain}
-        for name in sorted((self._needed & self._known.keys()) - others):
-            seen = sum(len(view) for view in self._views.of(self._physics, name))
-            if seen > _MORE * self._known[name].points:
-                found.append(name)
-        return tuple(found)
-
-    @property
-    def _among_others(self) -> bool:
-        """Whether the goals are about objects among others alone: these can be moved off what they hide."""
-        only_poses = all(isinstance(goal, PoseGoal | OnTableGoal) for goal in self._task.goals)
-        return only_poses and not self._task.furniture_masks
+        asked = (self._needed & self._known.keys()) - {self._held_name, *self._uncertain}
+        counts = {n: sum(map(len, self._views.of(self._physics, n))) for n in sorted(asked)}
+        return tuple(n for n, count in counts.items() if count > _MORE * self._known[n].points)
 
     def look_around(self) -> None:
         """Between two plans: look for what goals are about and others may have hidden, anew at what is uncertain, and
         at what goals are about and shows more of itself than when its shape was found."""
         now = float(self._physics.data.time)
+        # What furniture hides and the hand has lost may lie otherwise now: furniture is looked into again.
+        forgotten = (self._lost & self._enclosed & self._known.keys()) - {self._held_name}
+        for name in forgotten:
+            del self._known[name]
+        self._dropped, self._lost = self._dropped - forgotten, set()
         again = () if now == self._looked else (*self._uncertain, *self._outgrown)
-        if not (self._covered or again):
+        if not (self._covered or again or forgotten):
             return
         self.observe()
         self._looked, before = now, dict(self._known)
@@ -196,7 +196,7 @@ class EstimatedPerception:
                 self._known[name] = sensed
                 self._grasps.pop(name)
         self._find_objects()
-        if any(sensed is not before.get(name) for name, sensed in self._known.items()):
+        if forgotten or any(s is not before.get(name) for name, s in self._known.items()):
             self._build()
 
     def look_again(self) -> None:
@@ -214,6 +214,8 @@ class EstimatedPerception:
             if sensed is not None:
                 self._known[name] = self._seen[name] = sensed
                 self._grasps[name] = self._grasps_of(name, self._close_views)
+            elif name in self._seen:
+                self._known.setdefault(name, self._seen[name])  # what was forgotten shows no better
         self._build()
 
     @property
@@ -227,6 +229,7 @@ class EstimatedPerception:
             sensed = None if name in self._known else self._looked_at(name)
             if sensed is not None:
                 self._known[name] = sensed
+                self._grasps.pop(name, None)
 
     def _looked_at(self, name: str, more: ObjectViews | None = None) -> SensedPose | None:
         """The estimate of what may have any shape of its kind; by `more` views, of all standing cameras, if need be."""
@@ -281,8 +284,8 @@ class EstimatedPerception:
             self._held = InHand(name, invert(tcp) @ self._known[name].pose, self.robot()[1])
 
     @property
-    def _held_name(self) -> str | None:
-        return None if self._held is None else self._held.name
+    def _held_name(self) -> str:
+        return "" if self._held is None else self._held.name
 
     def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
         """The hand led a part along this path, by `T_world_tcp`; `stopped`: it went no further."""
@@ -309,7 +312,10 @@ class EstimatedPerception:
             before = replace(before, pose=tcp @ held.pose_tcp)
         views = self._views.of(self._physics, name)
         if sum(len(view) for view in views) < MIN_VIEW_POINTS:
-            return unless_gone(before, self._seen[name], lambda: self._sights.sights(self._physics))
+            if not is_gone(before, self._seen[name], lambda: self._sights.sights(self._physics)):
+                return before
+            self._lost.add(name)
+            return self._seen[name]
         misfit = before.shape.misfit(transform(invert(before.pose), seen_points(views)))
         if misfit <= _FITS[0] * before.misfit + _FITS[1] and before.confidence >= _SURE:
             self._seen[name] = before
@@ -356,15 +362,9 @@ class EstimatedPerception:
 
     def _grasps_of(self, name: str, by: ObjectViews | None = None) -> Callable[[], GraspSet]:
         """Samples grasps of what is seen now, for the pose estimated and those that goals ask for; once, when asked to."""
-        symmetries = {each: sensed.shape.label.symmetry for each, sensed in self._known.items()}
-        goals = [goal for goal in self._task.goals if getattr(goal, "object", None) == name]
-        frames = [goal.goal_frame(symmetries) for goal in goals]
-        rotations = [
-            np.asarray(frame.pose)[:3, :3]
-            for frame in frames
-            if frame is not None and frame.rotation_counts
-        ]
         sensed = self._known[name]
+        symmetries = {each: other.shape.label.symmetry for each, other in self._known.items()}
+        rotations = asked_rotations(self._task.goals, name, symmetries)
         views = (by or self._views).of(self._physics, name)
         views = views or self._more_views.of(self._physics, name)
 

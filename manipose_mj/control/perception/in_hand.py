@@ -30,21 +30,19 @@ class InHand:
         return opening < self.width - min(_LOST, _LOST_SHARE * self.width)
 
 
-def unless_gone(
-    believed: SensedPose, seen: SensedPose, sights: Callable[[], Sequence[Sight]]
-) -> SensedPose:
-    """Where an object is that no camera sees: where it is believed to be; where it was seen, if cameras look past it there.
+def is_gone(believed: SensedPose, seen: SensedPose, sights: Callable[[], Sequence[Sight]]) -> bool:
+    """Whether cameras look past an object, which none of them shows, where it is believed to be: it is where it was.
 
     Args:
       believed: By where the hand has gone.
       seen: When it was seen last.
       sights: How far cameras see now; not asked for where both are one.
     """
-    if believed.pose is seen.pose or np.allclose(believed.pose, seen.pose):
-        return believed
+    if np.allclose(believed.pose, seen.pose):
+        return False
     points = [_within(hull) for hull in believed.shape.hulls]
     past = seen_past(sights(), believed.pose)
-    return seen if past(np.concatenate(points)).mean() > _GONE else believed
+    return bool(past(np.concatenate(points)).mean() > _GONE)
 
 
 def _within(hull: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n+1 3"]:

@@ -67,6 +67,16 @@ def test_an_opening_is_found_near_where_the_hand_left_the_part(kind, truth, off,
     assert found_opening(part.at(truth + off), points) == pytest.approx(truth, abs=most)
 
 
+@pytest.mark.parametrize(("kind", "truth", "left"), [("hinge", 0.25, 1.7), ("slide", 0.02, 0.3)])
+def test_what_the_arm_has_swept_along_is_found_anywhere(kind, truth, left):
+    part = a_part(kind)
+    points = transform(part.motion(truth), part.looks)
+    assert found_opening(part.at(left), points) == pytest.approx(truth, abs=0.01)
+    # But what fits nowhere well is where it was: it is out of sight.
+    other = plane([FRONT - 0.1, -0.2, 0.1], [FRONT - 0.1, 0.2, 0.25])
+    assert found_opening(part.at(left), other) == left
+
+
 @pytest.mark.parametrize(("truth", "left", "before"), [(0.0, 0.0, 1.2), (1.2, 1.2, 0.0)])
 def test_what_stands_still_by_the_hinge_does_not_keep_a_door_where_it_was(truth, left, before):
     part = a_part("hinge")
