@@ -298,7 +298,7 @@ class EstimatedFurniture:
     def pushed(self, name: str, opening: float) -> None:
         """The hand pushed a part to about this opening [m or rad]; no further than it was: it is as open as anybody can tell."""
         part = self._part(name)
-        if part is not None and self.model is not None and opening == part.opening:
+        if part is not None and self.model is not None and 0.0 < opening == part.opening:
             self._swings.ends(name)
             self.model = self.model.with_part(part.opening_to(opening))
         elif part is not None and self.model is not None:

@@ -50,6 +50,7 @@ class Swings:
     def __init__(self) -> None:
         self._aims: dict[str, float] = {}
         self._beyond: set[str] = set()
+        self._reached: dict[str, float] = {}  # how far they have been open [rad]
 
     def pushed(self, name: str, aim: float) -> None:
         """A door was pushed, to where it should be open by `aim` [rad]."""
@@ -68,7 +69,8 @@ class Swings:
             return known
         if aim > _NEAR_END * known and opening > aim - _ALONG:
             return self.led(name, opening, known)
-        if not self.goes_on(name) or opening > aim - _BEHIND:
+        swept_back = opening < self._reached.get(name, 0.0) - _BEHIND
+        if not self.goes_on(name) or opening > aim - _BEHIND or swept_back:
             return known
         self._beyond.remove(name)
         return opening
@@ -83,6 +85,7 @@ class Swings:
 
     def led(self, name: str, opening: float, known: float) -> float:
         """The same, of a door that a hand or a push led there without a stop."""
+        self._reached[name] = max(opening, self._reached.get(name, 0.0))
         if opening < _NEAR_END * _WIDEST:
             self._beyond.add(name)
         else:
