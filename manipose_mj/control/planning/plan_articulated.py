@@ -33,6 +33,7 @@ SHUT_ENOUGH = 0.005  # of a joint [m or rad]
 _LEFT_OVER = (0.7, 0.4, 0.85)  # of a door's opening, by the first of two pushes
 # From which openings on a part that is estimated stands otherwise than it should: of its range, [m or rad].
 NOT_OPEN, NOT_SHUT = 0.08, {"slide": 0.012, "hinge": 0.05}
+_BESIDE_AREA = 0.005  # how far from the area of its goal an object is seen to be at most [m]
 _STICKS_OUT = 0.003  # of a cavity, by which an object may [m]
 _AREA_SHARES = ((0.0, 0.0), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
 _UP = np.array([0.0, 0.0, 1.0])
@@ -102,8 +103,10 @@ def parts_to_look_behind(goals: tuple[Goal, ...], estimate: SceneEstimate) -> tu
 
 
 def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
-    """Whether a part is seen to stand otherwise than a goal has it."""
+    """Whether a part is seen to stand, or what it hides or hid to lie, otherwise than a goal has it."""
     for goal in goals:
+        if isinstance(goal, InsideGoal | TakenOutGoal) and _lies_elsewhere(goal, estimate):
+            return True
         if not isinstance(goal, OpenGoal | ShutGoal):
             continue
         part = estimate.parts[goal.part]
@@ -118,6 +121,16 @@ def stand_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         if wrong:
             return True
     return False
+
+
+def _lies_elsewhere(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:
+    """Whether the object is known to be neither in the cavity nor over the area where it shall be."""
+    obj = estimate.objects.get(goal.object)
+    if obj is None:
+        return False
+    if isinstance(goal, InsideGoal):
+        return not lies_inside(obj, estimate.parts[goal.part])
+    return not _in_area(goal, obj, _BESIDE_AREA)
 
 
 def opening_plans(name: str, estimate: SceneEstimate) -> Iterator[Plan]:
@@ -137,7 +150,14 @@ def is_reached(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool
     obj, part = estimate.objects[goal.object], estimate.parts[goal.part]
     if isinstance(goal, InsideGoal):
         return _lies_all_inside(obj, part)
-    return not lies_inside(obj, part) and _near_one(obj, poses_in_area(goal, obj))
+    return not lies_inside(obj, part) and _in_area(goal, obj)
+
+
+def leads_through(goal: InsideGoal | TakenOutGoal, estimate: SceneEstimate) -> bool:
+    """Whether the object has to pass the part; what lies outside already can be put elsewhere with the part shut."""
+    if isinstance(goal, InsideGoal):
+        return not is_reached(goal, estimate)
+    return lies_inside(estimate.objects[goal.object], estimate.parts[goal.part])
 
 
 def _plans_through(
@@ -154,7 +174,8 @@ def _plans_through(
             raise InputError(f"{goal.object} fits the cavity of {goal.part} in no orientation")
     else:
         poses = poses_in_area(goal, obj)
-    opening = () if _lets_pass(part) else _open(part, wide_open)
+    shut_off = leads_through(goal, estimate) and not _lets_pass(part)
+    opening = _open(part, wide_open) if shut_off else ()
     if planner is None or lies_inside(obj, part):
         yield opening + place_at_each(goal.object, (poses,))
         return
@@ -208,10 +229,10 @@ def _lies_all_inside(obj: ObjectEstimate, part: PartEstimate) -> bool:
     return lies_inside(obj, part) and bool(sideways.all())
 
 
-def _near_one(obj: ObjectEstimate, poses: Poses) -> bool:
-    """Whether the object is at one of the places already, turned as it may be."""
-    places = np.stack([pose[:3, 3] for pose in poses])
-    return bool((np.linalg.norm(places - obj.label_pose[:3, 3], axis=1) < 0.05).any())
+def _in_area(goal: TakenOutGoal, obj: ObjectEstimate, beside: float = 0.0) -> bool:
+    """Whether the object is over the goal's area, or `beside` it by no more [m]."""
+    away = np.abs(obj.label_pose[:2, 3] - np.asarray(goal.center))
+    return bool((away <= np.asarray(goal.half_sides) + beside).all())
 
 
 def poses_in_area(goal: TakenOutGoal, obj: ObjectEstimate) -> Poses:

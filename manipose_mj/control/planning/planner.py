@@ -9,7 +9,7 @@ from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Plan
 from manipose_mj.control.planning.plan_articulated import (
     PartGoal,
-    is_reached,
+    leads_through,
     opening_plans,
     part_goal_plans,
     parts_to_look_behind,
@@ -109,7 +109,7 @@ def _plans_of_each(
             plans.append(transport_plans(goal, estimate, planner))
         elif isinstance(goal, PartGoal):
             plans.append(part_goal_plans(goal, estimate, planner, opened))
-            if isinstance(goal, InsideGoal | TakenOutGoal) and not is_reached(goal, estimate):
+            if isinstance(goal, InsideGoal | TakenOutGoal) and leads_through(goal, estimate):
                 opened |= {goal.part}
     return plans
 
