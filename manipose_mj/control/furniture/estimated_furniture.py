@@ -296,9 +296,10 @@ class EstimatedFurniture:
         self.model = model.with_part(moved)
 
     def pushed(self, name: str, opening: float) -> None:
-        """The hand pushed a part to about this opening [m or rad]; no further than it was: it is as open as anybody can tell."""
+        """The hand pushed a part to about this opening [m or rad]; no further than it was open: that is its end, as far as anybody can tell."""
         part = self._part(name)
-        if part is not None and self.model is not None and 0.0 < opening == part.opening:
+        stayed = part is not None and opening == part.opening > part.part.joint.range[0]
+        if part is not None and self.model is not None and stayed:
             self._swings.ends(name)
             self.model = self.model.with_part(part.opening_to(opening))
         elif part is not None and self.model is not None:

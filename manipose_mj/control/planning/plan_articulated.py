@@ -174,13 +174,14 @@ def _plans_through(
             raise InputError(f"{goal.object} fits the cavity of {goal.part} in no orientation")
     else:
         poses = poses_in_area(goal, obj)
-    shut_off = leads_through(goal, estimate) and not _lets_pass(part)
-    opening = _open(part, wide_open) if shut_off else ()
+    through = leads_through(goal, estimate)
+    opening = _open(part, wide_open) if through and not _lets_pass(part) else ()
     if planner is None or lies_inside(obj, part):
         yield opening + place_at_each(goal.object, (poses,))
         return
-    by_then = with_part_at(planner.scene, part, max(wide_open, part.opening))
-    for stops in routes(planner.within(by_then), estimate, obj, poses):
+    if through:
+        planner = planner.within(with_part_at(planner.scene, part, max(wide_open, part.opening)))
+    for stops in routes(planner, estimate, obj, poses):
         yield opening + place_at_each(goal.object, stops)
     if isinstance(goal, InsideGoal):
         tight = poses_in_cavity(obj, part, wide_open, estimate, others=True)

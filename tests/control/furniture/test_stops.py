@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import pytest
+
+from manipose_mj.control.furniture.estimated_furniture import EstimatedFurniture
 from manipose_mj.control.furniture.stops import Stops, Swings
+from tests.control.furniture.test_opened_part import DOOR, MODEL
 
 USUAL = 0.32
 
@@ -62,3 +68,14 @@ def test_a_door_that_nothing_leads_any_further_is_as_open_as_it_goes():
     assert swings.goes_on("door")
     swings.ends("door")
     assert not swings.goes_on("door")
+
+
+@pytest.mark.parametrize(("opening", "end"), [(1.3, 1.3), (0.0, 1.8)])
+def test_what_stays_where_it_was_pushed_is_at_its_end_unless_it_is_shut(opening, end):
+    task = SimpleNamespace(goals=(), furniture_masks=())
+    furniture = EstimatedFurniture(task, None, None, (), None)
+    furniture.model = MODEL.with_part(DOOR.at(opening))
+    furniture.pushed("door", opening)
+    (part,) = furniture.model.parts
+    assert part.part.joint.range == (0.0, end)
+    assert part.opening == opening
