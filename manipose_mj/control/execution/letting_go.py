@@ -8,8 +8,10 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.grasping.candidates import OPENING_MARGIN
 from manipose_mj.control.grasping.retreat import HANDLE_RETREATS, RETREATS, retreat
+from manipose_mj.control.motion.batch_ik import forward
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
@@ -24,6 +26,46 @@ _UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estim
 _FROM_BELOW_LETTING_GO = (MAX_OPENING, 0.055, 0.04, 0.025)
 _GIVING_WAY = (0.006, 0.012)
 _LOST = 0.01  # what is further from the hand has fallen from it [m]
+_OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
+_SETTLE = 0.25  # after letting go [s]
+_HANGS = 0.03  # how far a hand that still hangs on a handle is from where it should have backed off to [m]
+
+
+def let_go(executor: Executor, planner: MotionPlanner, name: str) -> Actions:
+    """Open the hand and back off from what it holds.
+
+    A handle whose shape is estimated may be wider in front of the fingers than between them: where the hand does not come
+    away, it opens all the way and backs off once more.
+
+    Args:
+      executor: Of actions.
+      planner: Says what to assume.
+      name: Of the object or part.
+
+    Raises:
+      StageFailure: There is no way back.
+    """
+    estimate = executor.observe()
+    planner = planner.within(estimate.scene)
+    yield from executor.open_to(opening_to_let_go(planner, estimate, name))
+    yield from executor.wait(_SETTLE)
+    executor.hold(None)
+    felt = executor.feels_joints and name in estimate.parts
+    for last in (False, True):
+        estimate = executor.observe()
+        planner = planner.within(estimate.scene)
+        line = retreat_from(planner, estimate, name, _OWN_PART if felt else None)
+        yield from executor.follow(line)
+        if last or not felt or _off(executor.joints(), line[-1]) < _HANGS:
+            return
+        yield from executor.relax()
+        yield from executor.open_to(MAX_OPENING)
+
+
+def _off(joints: Float[np.ndarray, "7"], target: Float[np.ndarray, "7"]) -> float:
+    """How far the hand is from where joint targets [rad] have it [m]."""
+    places = forward(np.stack([joints, target]))[0][:, :3, 3]
+    return float(np.linalg.norm(places[0] - places[1]))
 
 
 def opening_to_let_go(planner: MotionPlanner, estimate: SceneEstimate, name: str) -> float:

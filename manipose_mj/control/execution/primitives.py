@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Actions, Executor
-from manipose_mj.control.execution.letting_go import opening_to_let_go, retreat_from
+from manipose_mj.control.execution.letting_go import let_go, retreat_from
 from manipose_mj.control.execution.lifting import retraction_of
 from manipose_mj.control.execution.part_lead import lead_part
 from manipose_mj.control.execution.slip import closed_past, exceeds, pose_in_hand, slip_of
@@ -20,7 +20,7 @@ from manipose_mj.control.grasping.part_pick import (
     leads_enough,
     way_in_hand,
 )
-from manipose_mj.control.grasping.part_push import off_surface, push_part
+from manipose_mj.control.grasping.part_push import off_surface, push_part, reached_by
 from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
 from manipose_mj.control.grasping.retraction import (
     Place,
@@ -47,12 +47,11 @@ _PUSHED = 0.015  # what a push moves an object at least [m]
 _PUSH_TOLERANCE = 0.02  # the same, from which on a push has nothing to do
 _PUSHES = 2  # of a part
 _STAGES = 6  # the same, where each may lead it less far than all the way
+_AT_END = 0.1  # how far a push leads a door on that is at its end, at most [rad]
 _IN_VAIN = 0.3  # of what a push should move a part by, under which it is not made again
 # How far beyond where it should be shut, or open, a part is pushed whose place is estimated [m, rad].
 _BEYOND_SHUT = {"slide": 0.010, "hinge": 0.03}
 _BEYOND_OPEN = {"slide": 0.0, "hinge": 0.08}
-_OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
-_SETTLE = 0.25  # after letting go [s]
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ class Primitives:
         if closed_past(estimate, name, pick.width):
             if name in estimate.objects and estimate.objects[name].uncertainty > 0:
                 self._slipped.setdefault(name, []).append(pose_in_hand(estimate, name))
-            yield from self._let_go(planner, name)
+            yield from let_go(self._executor, planner, name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
         self._executor.hold(name)
         self._held = _Held(name, pick, pose_in_hand(estimate, name))
@@ -157,7 +156,8 @@ class Primitives:
             raise StageFailure("plan", f"release {name} while nothing is held")
         if not isinstance(held.pick, PartPick):
             self._released[name] = held.pose_tcp
-        yield from self._let_go(planner.touching_support(held.pick.support_allowance), name)
+        planner = planner.touching_support(held.pick.support_allowance)
+        yield from let_go(self._executor, planner, name)
 
     def avoid_last_grasps(self) -> None:
         """Objects were set down, and it did not do: take them another way next time."""
@@ -180,15 +180,6 @@ class Primitives:
         """A new estimate, and the planner in its scene."""
         estimate = self._executor.observe()
         return estimate, planner.within(estimate.scene)
-
-    def _let_go(self, planner: MotionPlanner, name: str) -> Actions:
-        estimate, planner = self._observe(planner)
-        yield from self._executor.open_to(opening_to_let_go(planner, estimate, name))
-        yield from self._executor.wait(_SETTLE)
-        self._executor.hold(None)
-        estimate, planner = self._observe(planner)
-        near = _OWN_PART if self._executor.feels_joints and name in estimate.parts else None
-        yield from self._executor.follow(retreat_from(planner, estimate, name, near))
 
     def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
         name = step.subject
@@ -304,7 +295,11 @@ class Primitives:
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))
-        self._executor.pushed(name, float(push.way.openings[-1]))
+        reached, blocked = reached_by(push.way, self._executor.joints())
+        # Where the hand goes no further at once, a door that was led as far as is usual is at its end.
+        opens = part.goes_on and opening > part.opening
+        at_end = blocked and opens and reached - part.opening < _AT_END
+        self._executor.pushed(name, part.opening if at_end else reached)
         estimate, planner = self._observe(planner)
         gone = abs(estimate.parts[name].opening - part.opening)
         meant = min(abs(opening - part.opening), abs(push.way.openings[-1] - part.opening))

@@ -16,6 +16,7 @@ from manipose_mj.control.grasping.handle_grasps import (
 )
 from manipose_mj.control.grasping.part_motion import PartWay, find_way, promise
 from manipose_mj.control.grasping.part_pick import is_a_stage, share_of
+from manipose_mj.control.motion.batch_ik import forward
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.scene.articulation import joint_motion
 from manipose_mj.control.scene.collision_query import CONTACT, CollisionQuery
@@ -29,6 +30,7 @@ _MAX_PUSHES = 24  # for which a way is looked for
 _MAX_IN_STAGES = 48  # the same, where none has to lead all the way
 _MAX_TRIES = 12  # ways for which an approach is looked for
 _ALL_THE_WAY = 0.999  # of what is asked
+_BLOCKED = 0.03  # how far from its end a hand is that something stopped [m]
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,13 @@ def _approached(
             approach = np.concatenate([line[::-1], way.joints[:1]])
             return PartPush(free_path, approach, way)
     return None
+
+
+def reached_by(way: PartWay, joints: Float[np.ndarray, "7"]) -> tuple[float, bool]:
+    """How far a push has led its part [m or rad], and whether something stopped the hand, by where the arm is [rad]."""
+    places = forward(np.concatenate([way.joints, joints[None]]))[0][:, :3, 3]
+    off = np.linalg.norm(places[:-1] - places[-1], axis=1)
+    return float(way.openings[int(off.argmin())]), bool(off[-1] > _BLOCKED)
 
 
 def off_surface(
