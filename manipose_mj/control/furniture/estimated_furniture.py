@@ -19,7 +19,7 @@ from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
 from manipose_mj.control.furniture.opening_search import Hidden, found_opening, misfit
 from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
-from manipose_mj.control.furniture.pulled_out import pulled_out
+from manipose_mj.control.furniture.pulled_out import as_it_moved, pulled_out
 from manipose_mj.control.furniture.scene_cloud import (
     SceneCloud,
     SceneViews,
@@ -242,6 +242,7 @@ class EstimatedFurniture:
             for part in suspected:
                 before = self._before.pop(part.name, None)
                 handled = self._moved.get(part.name, False)
+                part = as_it_moved(part, points) if handled else part
                 opening = found_opening(part, points, hidden, before, tree=tree, touched=handled)
                 known = part.part.joint.range[1]
                 if self._shall_open_wide(part):

@@ -1,13 +1,16 @@
-"""A drawer that stands open and whose handle was not found: its front stands out of the body."""
+"""Drawers that stand open: the front that stands out of the body, where no handle was found or the hand has led it out."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
+from manipose_mj.control.furniture.furniture_fit import cavity_behind
 from manipose_mj.control.furniture.other_kind import as_drawer
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
@@ -27,6 +30,11 @@ _LEAST, _SMALLEST = 200, 0.05  # points of a front; its sides [m]
 _THICKNESS = 0.018  # [m]
 _HANDLE = 0.03  # of a handle before its front [m]
 _LOOKS = 500
+# Of a drawer that was led out: how far at least, by how much less or more it may be than was felt, a step of the search, how
+# near a point is that shows one of its looks [m]; how many of these have to have come along, which share may have stayed; the
+# panel beyond what came along [m].
+_LED_OUT, _SLIPPED, _BEYOND, _STEP, _SHOWS = 0.06, 0.12, 0.03, 0.003, 0.006
+_CAME, _STAYED, _RIM = 40, 0.1, 0.005
 
 
 def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> FurnitureModel | None:
@@ -74,3 +82,31 @@ def pulled_out(model: FurnitureModel, cloud: SceneCloud, name: str) -> Furniture
     joint = replace(joint, range=(0.0, max(joint.range[1], opening)))
     drawer = replace(drawer, part=replace(drawer.part, joint=joint), opening=opening)
     return model.with_another(drawer)
+
+
+def as_it_moved(part: PartModel, points: Float[np.ndarray, "n 3"]) -> PartModel:
+    """A drawer without what stayed behind as the hand led it out: that was never its front.
+
+    The same where little stayed behind, or where hardly anything came along: the hand may have slipped off.
+
+    Args:
+      part: At the opening that the hand has led it to.
+      points: Of the furniture now, object frame [m].
+    """
+    if part.hinged or part.opening < _LED_OUT:
+        return part
+    tree, axis = cKDTree(points), part.part.joint.axis
+    openings = np.arange(max(part.opening - _SLIPPED, _LED_OUT), part.opening + _BEYOND, _STEP)
+    shown = [tree.query(part.looks + o * axis, distance_upper_bound=_SHOWS)[0] for o in openings]
+    best = int(np.argmax([np.isfinite(each).sum() for each in shown]))
+    came = np.isfinite(shown[best])
+    stayed = (tree.query(part.looks)[0] < _SHOWS) & ~came
+    if came.sum() < _CAME or stayed.sum() < _STAYED * len(part.looks):
+        return part
+    low, high = np.percentile(part.looks[came], [2, 98], axis=0)
+    panel = part.panel.copy()
+    panel[0, 1:] = np.maximum(panel[0, 1:], low[1:] - _RIM)
+    panel[1, 1:] = np.minimum(panel[1, 1:], high[1:] + _RIM)
+    cavity = cavity_behind(panel, "slide", part.part.joint.range[1], 0.0)
+    part = replace(part, panel=panel, looks=part.looks[came], opening=float(openings[best]))
+    return replace(part, part=replace(part.part, cavity=cavity))

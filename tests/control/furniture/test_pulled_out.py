@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.control.furniture.pulled_out import pulled_out
+from manipose_mj.control.furniture.pulled_out import as_it_moved, pulled_out
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
@@ -67,3 +69,27 @@ def test_handles_and_what_is_beside_the_body_are_no_drawers():
     handle = face(FRONT + 0.045, [-0.06, 0.09], [0.06, 0.11], 0.002)
     beside = face(FRONT + 0.2, [0.35, 0.1], [0.6, 0.3])
     assert pulled_out(cabinet(), cloud(SHUT, handle, beside), "top_drawer") is None
+
+
+def led(opening: float) -> PartModel:
+    """Of all that is taken for its front, the lower two thirds are other fronts."""
+    (drawer,) = cabinet().parts
+    panel = np.array([[FRONT - 0.018, -0.2, 0.0], [FRONT, 0.2, 0.45]])
+    looks = face(FRONT, [-0.2, 0.0], [0.2, 0.45], 0.01)
+    drawer = replace(drawer, panel=panel, looks=looks)
+    return drawer.at(opening).opening_to(0.3)
+
+
+@pytest.mark.parametrize("felt", [0.25, 0.27, 0.33])
+def test_what_stayed_behind_as_a_drawer_was_led_out_is_not_its_front(felt):
+    out = face(FRONT + 0.25, [-0.2, 0.30], [0.2, 0.45], 0.004)
+    behind = face(FRONT, [-0.2, 0.0], [0.2, 0.30], 0.004)
+    part = as_it_moved(led(felt), np.concatenate([out, behind]))
+    np.testing.assert_allclose(part.panel[:, 2], [0.30, 0.45], atol=0.015)
+    assert part.opening == pytest.approx(0.25, abs=0.005)
+
+
+def test_a_drawer_that_the_hand_slipped_off_is_what_it_was():
+    shut = face(FRONT, [-0.2, 0.0], [0.2, 0.45], 0.004)
+    before = led(0.25)
+    assert as_it_moved(before, shut) is before
