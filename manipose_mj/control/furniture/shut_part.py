@@ -33,14 +33,18 @@ _OUT = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _LONG = 1.5  # times as long as wide: a bar
 # Of handles that look like a sensed one: how near another that was sensed would be it [m], their share of the confidence.
 _KNOWN, _TWIN = 0.04, 0.8
-_SURE = 0.25  # confidence of drawers that tell of others in their column
+_SURE = 0.25  # confidence of drawers that tell of others in their column, or row
+_LEVEL, _ALIKE = (
+    0.015,
+    0.010,
+)  # how far handles in a row differ in height, and in half of their lengths [m]
 
 
 class ShutPart:
     """A sensed part in the object frame, as if it were shut.
 
     Attributes: sensed; pose: `T_world_object`; kind; opening; axis; origin; handle: `T_object_handle`; half: of the
-    handle's lengths along the object's axes, and a little more, as far as they show [m].
+    handle's lengths along the object's axes, and a little more, as far as they show [m]; measured: whether they do.
     """
 
     def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
@@ -57,6 +61,7 @@ class ShutPart:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
         self.half = np.abs(self.handle[:3, 0]) * _USUAL_HALF + 2 * _BESIDE
+        self.measured = False
 
     def meet_handle(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
@@ -75,6 +80,7 @@ class ShutPart:
         if seen and np.linalg.norm(label.origin - self.handle[:3, 3]) < _MISPLACED:
             self.handle[:3, 3] = label.origin
             self.half = np.abs(label.rotation) @ label.extents / 2 + _BESIDE
+            self.measured = True
         return seen
 
     def _straighten(self, points: Float[np.ndarray, "n 3"], front: float) -> None:
@@ -166,13 +172,18 @@ class ShutPart:
         points: Float[np.ndarray, "n 3"],
         normals: Float[np.ndarray, "n 3"],
     ) -> None:
-        """Where the estimated hinge is no door's, turn about the likely edge."""
+        """Where the estimated hinge is no door's, turn about the likely edge; slide as the drawer beside it does."""
         # What shows open is a door; where its handle is, shut, tells others little.
         if self.kind == "slide" or (self.opening > 0.0 and abs(self.axis[0]) < _KNOBS):
             return
         shut = [other for other in others if other.opening == 0.0 or other.kind == "slide"]
         between = between_neighbours(self, shut, bounds)
-        if not can_be_a_door(self.origin, self.axis, self.handle, between):
+        possible = can_be_a_door(self.origin, self.axis, self.handle, between)
+        askew = not possible or np.abs(self.axis).max() < _SNAP
+        if askew and self.opening == 0.0 and any(map(self._is_in_a_row_with, others)):
+            self.kind, self.axis = "slide", np.array([1.0, 0.0, 0.0])
+            self.origin = self.handle[:3, 3].copy()
+        elif not possible:
             front = panel_place(points, normals, self) if self.opening == 0.0 else None
             if front is not None:
                 facing = points[normals[:, 0] > FACING]
@@ -180,6 +191,15 @@ class ShutPart:
             self.handle = invert(self.back) @ self.handle
             self.opening, self.back = 0.0, np.eye(4)
             self.origin, self.axis = likely_hinge(self.handle, between)
+
+    def _is_in_a_row_with(self, other: ShutPart) -> bool:
+        """Whether a sure drawer has a handle of the same size at the same height, and both show."""
+        if other is self or not (self.measured and other.measured):
+            return False
+        alike = np.abs(other.half - self.half).max() < _ALIKE
+        level = abs(float(other.handle[2, 3] - self.handle[2, 3])) < _LEVEL
+        sure = other.kind == "slide" and other.sensed.confidence >= _SURE
+        return sure and bool(alike and level)
 
     def meet_front(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], front: float

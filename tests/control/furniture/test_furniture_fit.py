@@ -210,3 +210,20 @@ def test_what_is_beside_the_column_longer_or_without_a_front_around_it_is_no_dra
     column = cloud([*body(), bar(0.25), bar(0.40)])
     unsure = replace(drawer, confidence=0.2)
     assert len(fit_furniture(column, SensedFurniture(X, (unsure,)), "cabinet").parts) == 1
+
+
+@pytest.mark.parametrize(("tilt", "hinged"), [(0.5, 0), (0.0, 1)])
+def test_what_has_a_drawers_handle_beside_it_slides_too_unless_its_hinge_is_a_doors(tilt, hinged):
+    knobs = [
+        rectangle(np.array([FRONT + 0.03, y - 0.012, 0.188]), 0.024 * Y, 0.024 * Z, X)
+        for y in (0.15, -0.15)
+    ]
+    drawer = sensed("slide", [FRONT + 0.03, -0.15, 0.2])
+    turn = rotation_about(X, tilt)
+    beside = replace(
+        sensed("hinge", [FRONT + 0.03, 0.15, 0.2]),
+        origin=np.array([FRONT, 0.0, 0.2]),
+        axis=-turn @ Z,
+    )
+    model = fit_furniture(cloud([*body(), *knobs]), SensedFurniture(X, (drawer, beside)), "cabinet")
+    assert sum(part.hinged for part in model.parts) == hinged

@@ -67,8 +67,9 @@ def column_of(
     """
     half = np.abs(handle.rotation) @ handle.extents / 2
     local, ahead = points - handle.origin, points[:, 0] - front
-    column = (ahead > _STANDING[0]) & (ahead < _STANDING[1])
-    column &= np.abs(local[:, 1]) < half[1] + _AS_WIDE
+    out = (ahead > _STANDING[0]) & (ahead < _STANDING[1])
+    column = out & (np.abs(local[:, 1]) < half[1] + _AS_WIDE)
+    beside = out & ~column & (np.abs(local[:, 1]) < half[1] + 2 * _AS_WIDE)
     flush = local[np.abs(ahead) < _FLUSH, 1:]
     own = column & (np.abs(local[:, 2]) < half[2] + _GAP / 2)
     if own.sum() < _FEW:
@@ -81,7 +82,10 @@ def column_of(
             rest &= away > away[on].max()
             low, high = local[on].min(axis=0), local[on].max(axis=0)
             plumb = abs(float(np.median(local[on, 1]) - np.median(local[own, 1]))) < _AS_WIDE / 2
-            alike = plumb and _as_large(local[own], local[on])
+            goes_on = (
+                beside & (local[:, 2] > low[2]) & (local[:, 2] < high[2])
+            )  # an edge of a board
+            alike = plumb and goes_on.sum() < _FEW and _as_large(local[own], local[on])
             if alike and _shown_around(flush, low[1:], high[1:]) >= _SIDES_OF_BAR:
                 found.append(handle.origin + np.array([0.0, 0.0, (low[2] + high[2]) / 2]))
     return found
