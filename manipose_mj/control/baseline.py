@@ -62,7 +62,8 @@ class _Progress:
     def led_on(self, before: SceneEstimate, after: SceneEstimate) -> None:
         """A plan failed: where it has moved a part, what failed before may do now."""
         shares = [{p.name: _share_open(p) for p in each.parts.values()} for each in (before, after)]
-        if any(abs(shares[1][name] - share) > _LED_ON for name, share in shares[0].items()):
+        # What was taken for a part may have turned out to be none.
+        if any(abs(shares[1].get(n, share) - share) > _LED_ON for n, share in shares[0].items()):
             self.failures_here = (
                 -1
             )  # with the failure that is about to be counted: the first plan again
