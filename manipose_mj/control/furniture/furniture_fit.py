@@ -18,10 +18,13 @@ from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import handle_boxes, handle_label
+from manipose_mj.control.furniture.shapes.relief import relief
 from manipose_mj.control.furniture.shut_part import (
     FACING,
     ShutPart,
     between_neighbours,
+    claim,
+    missed,
     panel_place,
 )
 from manipose_mj.poses import invert, transform
@@ -54,13 +57,15 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     normals = cloud.normals @ pose[:3, :3]
     shut = [ShutPart(part, pose) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
-    lost = [part for part in shut if not part.meet_handle(points, normals)]
+    for part in shut:
+        part.meet_handle(points, normals)
     if category not in WITH_KNOBS:
-        for part in lost:
-            part.find_handle(shut, points, normals)
+        front = relief(points, float(bounds[1, 0]))
+        claim(shut, front, points)
         shut += [twin for part in shut if (twin := part.twin(shut, points, normals))]
         for part in tuple(shut):
             shut += part.column(shut, points, normals)
+        shut += missed(shut, front, points)
         for part in shut:
             part.turn_as_doors_do(shut, bounds, points, normals)
     if any(part.opening == 0.0 for part in shut):
@@ -149,7 +154,8 @@ def _part(
     panel = _within_face(panel, moved[turned[:, 0] > FACING], part)
     low, high = panel
     on = ((moved > low - 0.006) & (moved < high + 0.006)).all(axis=1)
-    handle, seen = handle_label(moved, part.handle, front)
+    base = front if part.base is None else part.base
+    handle, seen = handle_label(moved, part.handle, base)
     held = np.abs(transform(invert(handle.pose), moved)) < handle.extents / 2 + 0.006
     rows = np.flatnonzero(on | held.all(axis=1))
     rows = np.random.default_rng(number).permutation(rows)[:_LOOKS]
@@ -160,7 +166,7 @@ def _part(
     return PartModel(
         part=MovingPart(name, joint, handle, cavity),
         panel=panel,
-        handle=handle_boxes(handle, front),
+        handle=handle_boxes(handle, base),
         opening=part.opening,
         confidence=part.sensed.confidence * (1.0 if seen or part.sensed.certain else _UNSEEN),
         looks=moved[rows],

@@ -16,7 +16,8 @@ from manipose_mj.control.furniture.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
-from manipose_mj.control.furniture.shapes.standing_out import column_of, nearest_of, twin_of
+from manipose_mj.control.furniture.shapes.relief import Bump, Relief
+from manipose_mj.control.furniture.shapes.standing_out import column_of, twin_of
 from manipose_mj.poses import compose, invert, transform
 
 FACING = 0.6  # cosine between normals of the front and X, at least
@@ -27,6 +28,9 @@ _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
 _USUAL_HALF, _BESIDE = 0.05, 0.005
+# How near a handle what stands out of the front is the handle, and how far from where it was sensed it may be [m]; the
+# confidence of what was not sensed.
+_AT_HANDLE, _FAR, _MISSED = 0.03, 0.60, 0.12
 _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
 _OUT = 0.9  # cosine between a handle's Y and the way out of the front, at least
@@ -44,7 +48,8 @@ class ShutPart:
     """A sensed part in the object frame, as if it were shut.
 
     Attributes: sensed; pose: `T_world_object`; kind; opening; axis; origin; handle: `T_object_handle`; half: of the
-    handle's lengths along the object's axes, and a little more, as far as they show [m]; measured: whether they do.
+    handle's lengths along the object's axes, and a little more, as far as they show [m]; measured: whether they do; base: how far
+    out what the handle stands on is, along X, where it is no part of the panel's plane [m].
     """
 
     def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
@@ -61,6 +66,7 @@ class ShutPart:
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
         self.back = back
         self.half = np.abs(self.handle[:3, 0]) * _USUAL_HALF + 2 * _BESIDE
+        self.base: float | None = None
         self.measured = False
 
     def meet_handle(
@@ -93,24 +99,18 @@ class ShutPart:
         if slender:
             self.handle[:3, :3] = max(slender, key=lambda each: each[0])[1]
 
-    def find_handle(
-        self,
-        others: Sequence[ShutPart],
-        points: Float[np.ndarray, "n 3"],
-        normals: Float[np.ndarray, "n 3"],
-    ) -> None:
-        """Where no handle shows, take what stands out of the front nearest to it."""
-        front = panel_place(points, normals, self)
-        if front is None or self.sensed.certain:
-            return
-        taken = np.array([o.handle[:3, 3] for o in others if o is not self]).reshape(-1, 3)
-        found = nearest_of(points, self.handle[:3, 3], front, taken)
-        if found is None:
-            return
-        (across, upright), self.handle[:3, 3] = found[1], found[0]
+    def take(self, bump: Bump, points: Float[np.ndarray, "n 3"]) -> None:
+        """Have for a handle what stands out of the front there."""
+        across, upright = bump.size
+        self.handle[:3, 3] = bump.middle
         if max(across, upright) > _LONG * min(across, upright):
             self.handle[:3, :3] = UP_FRONT if upright > across else ACROSS_FRONT
-        self.meet_handle(points, normals)
+        label, seen = handle_label(points, self.handle, bump.base)
+        if seen:
+            self.handle[:3, 3] = label.origin
+        lengths = np.abs(label.rotation) @ label.extents if seen else np.array([0.0, *bump.size])
+        self.half = lengths / 2 + _BESIDE
+        self.base, self.measured = bump.base, True
 
     def twin(
         self,
@@ -237,6 +237,58 @@ class ShutPart:
         self.handle = self.back @ stands
         # The handle was taken to be as far open as the panel.
         self.handle[:3, :3] = _along_axes(self.handle[:3, :3], np.cos(_MISSWUNG))
+
+
+def claim(shut: Sequence[ShutPart], relief: Relief, points: Float[np.ndarray, "n 3"]) -> None:
+    """Give handles what stands out of the front where they were sensed, or else nearest to it; the surest choose first.
+
+    A handle stays where it was sensed if cameras do not see that nothing stands out there.
+
+    Args:
+      shut: Parts as they were sensed.
+      relief: Of the front.
+      points: Of the furniture, object frame [m].
+    """
+    free = list(relief.bumps)
+    parts = [part for part in shut if part.opening == 0.0 and not part.sensed.certain]
+    parts.sort(key=lambda part: -part.sensed.confidence)
+    for most in (_AT_HANDLE, _FAR):
+        for part in parts:
+            place = part.handle[:3, 3]
+            if part.base is not None or not free or (most == _FAR and not relief.shows(place)):
+                continue
+            nearest = min(free, key=lambda bump: bump.beside(place))
+            if nearest.beside(place) < most:
+                part.take(nearest, points)
+                free = [bump for bump in free if bump is not nearest]
+
+
+def missed(
+    shut: Sequence[ShutPart], relief: Relief, points: Float[np.ndarray, "n 3"]
+) -> list[ShutPart]:
+    """Parts of what stands out of the front and is no handle of these, of little confidence; arguments as of `claim`."""
+    taken = [part.handle[:3, 3] for part in shut]
+    free = [b for b in relief.bumps if all(b.beside(place) > _AT_HANDLE for place in taken)]
+    return [_missed_part(bump, shut, points) for bump in free] if shut else []
+
+
+def _missed_part(
+    bump: Bump, shut: Sequence[ShutPart], points: Float[np.ndarray, "n 3"]
+) -> ShutPart:
+    """A part by its handle alone: of the kind of that whose handle is as large, or a door."""
+    like = max(shut, key=lambda part: part.sensed.confidence)
+    handle = compose(like.pose[:3, :3] @ ACROSS_FRONT, transform(like.pose, bump.middle[None])[0])
+    sensed = replace(like.sensed, handle=handle, opening=0.0, confidence=_MISSED)
+    part = ShutPart(sensed, like.pose)
+    part.take(bump, points)
+    alike = [o for o in shut if o.measured and np.abs(o.half - part.half).max() < _ALIKE]
+    near = min(
+        alike, key=lambda o: float(np.linalg.norm(o.handle[:3, 3] - bump.middle)), default=None
+    )
+    part.kind = "hinge" if near is None else near.kind
+    # A hinge is looked for where a door's is likely to be.
+    part.axis, part.origin = np.array([1.0, 0.0, 0.0]), part.handle[:3, 3].copy()
+    return part
 
 
 def motion_of(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:

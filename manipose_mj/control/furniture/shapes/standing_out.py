@@ -1,10 +1,9 @@
-"""What stands out of a front as handles do: the other one of a pair, those of a column, and one near where none was."""
+"""What stands out of a front as handles do: the other one of a pair, and those of a column."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy import ndimage
 
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.shapes.handle_shape import run_around
@@ -16,13 +15,9 @@ _AS_HIGH = 0.03  # how far both may differ, upright [m]
 _AS_WIDE = 0.02  # the same, across [m]
 _AS_MANY = 0.4  # of the points of one that the other shows, at least
 _FEW = 12  # points of a handle, at least
-# Of what is looked for where no handle is: how far away [m], the side of a cell [m], points in one; the longest and the
-# widest handle [m]; a margin around it, and how near the front it shows the front [m], on so many of four sides.
-_FAR, _CELL, _IN_CELL = 0.40, 0.008, 2
-_OUT = 0.008  # how far it stands out, at least [m]
-_LONGEST, _WIDEST = 0.35, 0.06
-_AROUND, _FLUSH, _SIDES = 0.025, 0.008, 3
-_SIDES_OF_BAR = 2  # of a level bar, whose ends are beside little of the front
+# A margin around a handle, and how near the front it shows the front [m], on so many of four sides: a level bar's ends are
+# beside little of it.
+_AROUND, _FLUSH, _SIDES_OF_BAR = 0.025, 0.008, 2
 
 
 def twin_of(
@@ -89,43 +84,6 @@ def column_of(
             if alike and _shown_around(flush, low[1:], high[1:]) >= _SIDES_OF_BAR:
                 found.append(handle.origin + np.array([0.0, 0.0, (low[2] + high[2]) / 2]))
     return found
-
-
-def nearest_of(
-    points: Float[np.ndarray, "n 3"],
-    place: Float[np.ndarray, "3"],
-    front: float,
-    taken: Float[np.ndarray, "k 3"],
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "2"]] | None:
-    """The middle of what stands out of a front nearest to a place, and its size across and upright; None if nothing does.
-
-    Args:
-      points: Of the furniture, object frame, X out of the front and Z up [m].
-      place: Where a handle should be, object frame [m].
-      front: Of the part, along X [m].
-      taken: Handles of other parts, object frame [m].
-    """
-    local, ahead = points - place, points[:, 0] - front
-    near = (np.abs(local[:, 1:]) < _FAR).all(axis=1)
-    out = near & (ahead > _OUT) & (ahead < _STANDING[1])
-    flush = local[near & (np.abs(ahead) < _FLUSH), 1:]
-    if out.sum() < _FEW:
-        return None
-    cells = np.floor((local[out, 1:] + _FAR) / _CELL).astype(int)
-    counts = np.zeros((round(2 * _FAR / _CELL) + 1,) * 2, int)
-    np.add.at(counts, tuple(cells.T), 1)
-    names, _ = ndimage.label(counts >= _IN_CELL, structure=np.ones((3, 3)))
-    of = names[tuple(cells.T)]
-    found = []
-    for name in range(1, names.max() + 1):
-        own = local[out][of == name]
-        low, high = own.min(axis=0), own.max(axis=0)
-        size, middle = (high - low)[1:], (low + high) / 2
-        fits = len(own) >= _FEW and size.max() < _LONGEST and size.min() < _WIDEST
-        free = not len(taken) or np.abs(taken - place - middle)[:, 1:].max(axis=1).min() > _WIDEST
-        if fits and free and _shown_around(flush, low[1:], high[1:]) >= _SIDES:
-            found.append((float(np.linalg.norm(middle[1:])), place + middle, size))
-    return min(found, key=lambda each: each[0])[1:] if found else None
 
 
 def _shown_around(
