@@ -9,18 +9,18 @@ from jaxtyping import Bool, Float
 from scipy import ndimage
 
 _CELL = 0.004  # side of a cell of the relief [m]
+_PIXEL = 1.5  # cells between pixels, at most
 _WIDEST = 0.052  # what is wider than this both ways is no handle, but part of the front [m]
 _LONGEST = 0.75  # [m]
 _STANDING = (0.008, 0.09)  # how far cells of handles stand out of what is beside them [m]
 _LEAST_OUT = 0.011  # the same of a handle, in the median: noise of far pixels stands out less [m]
 _AHEAD, _BEHIND = 0.15, 0.03  # what is looked at before and behind the front [m]
 _FEWEST = (5, 12)  # cells, and points, of a bump
-_BESIDE = 0.02  # how far beside a bump the front has to show [m]
+# How far beside a bump the front has to show, at least [m], and of what it stands out by: it casts a shadow.
+_BESIDE, _SHADOW = 0.02, 1.2
 _FRONT_SHOWS = 0.4  # share of what is beside each of its long sides that does
-_AROUND, _SHOWN = (
-    0.03,
-    0.7,
-)  # how far around a place is looked at [m], and which share of that has to show
+# How far around a place is looked at [m], and which share of that has to show.
+_AROUND, _SHOWN = 0.03, 0.7
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,10 @@ def relief(points: Float[np.ndarray, "n 3"], front: float) -> Relief:
     height, counts = np.full(shape, -np.inf), np.zeros(shape, int)
     np.maximum.at(height, cells, seen[:, 0])
     np.add.at(counts, cells, 1)
-    nearest = ndimage.distance_transform_edt(
-        counts == 0, return_distances=False, return_indices=True
-    )
     shown = ndimage.binary_dilation(
         counts > 0, np.ones((3, 3))
     )  # pixels may be further apart than cells
-    height = ndimage.median_filter(height[tuple(nearest)], 3)
+    height = ndimage.median_filter(_filled(height), 3)
     base = ndimage.grey_opening(height, round(_WIDEST / _CELL))
     out = height - base
     names, count = ndimage.label((out > _STANDING[0]) & shown, structure=np.ones((3, 3)))
@@ -95,7 +92,8 @@ def relief(points: Float[np.ndarray, "n 3"], front: float) -> Relief:
         if size.min() > _WIDEST or size.max() > _LONGEST or not _LEAST_OUT < stands < _STANDING[1]:
             continue
         ground = float(np.median(base[box][own]))
-        if not _on_a_front(shown & (np.abs(height - ground) < _STANDING[0]), box, size):
+        flush = shown & (np.abs(height - ground) < _STANDING[0])
+        if not _on_a_front(flush, box, size, max(_BESIDE, _SHADOW * stands)):
             continue
         start = low + np.array([each.start for each in box]) * _CELL
         middle = np.array([float(height[box][own].max()), *(start + size / 2)])
@@ -103,11 +101,23 @@ def relief(points: Float[np.ndarray, "n 3"], front: float) -> Relief:
     return Relief(tuple(found), shown, low)
 
 
+def _filled(height: Float[np.ndarray, "w h"]) -> Float[np.ndarray, "w h"]:
+    """A relief without gaps: cells between pixels are as high as the nearest, wider gaps as low as anything near them, for
+    they are shadows of what stands out."""
+    away, nearest = ndimage.distance_transform_edt(~np.isfinite(height), return_indices=True)
+    close = height[tuple(nearest)]
+    lowest = ndimage.minimum_filter(np.where(away < _PIXEL, close, np.inf), round(_WIDEST / _CELL))
+    return np.where((away < _PIXEL) | ~np.isfinite(lowest), close, lowest)
+
+
 def _on_a_front(
-    flush: Bool[np.ndarray, "h w"], box: tuple[slice, slice], size: Float[np.ndarray, "2"]
+    flush: Bool[np.ndarray, "w h"],
+    box: tuple[slice, slice],
+    size: Float[np.ndarray, "2"],
+    beside: float,
 ) -> bool:
-    """Whether the front shows along both of the long sides of what stands out: at the edge of a board it does not."""
-    margin = round(_BESIDE / _CELL)
+    """Whether the front shows within so far [m] of both long sides of what stands out: at the edge of a board it does not."""
+    margin = round(beside / _CELL)
     short = int(np.argmin(size))
     sides = []
     for start, stop in (
@@ -116,6 +126,6 @@ def _on_a_front(
     ):
         strip = [box[0], box[1]]
         strip[short] = slice(max(start, 0), max(stop, 0))
-        beside = flush[tuple(strip)]
-        sides.append(beside.any(axis=short).mean() if beside.size else 0.0)
+        seen = flush[tuple(strip)]
+        sides.append(seen.any(axis=short).mean() if seen.size else 0.0)
     return min(sides) > _FRONT_SHOWS
