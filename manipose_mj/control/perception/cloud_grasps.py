@@ -11,15 +11,16 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.asset import GraspSet, StablePose
 from manipose_mj.assets.gripper import ParallelJaw
 from manipose_mj.grasp_sampling.antipodal import antipodal_pairs
-from manipose_mj.grasp_sampling.approaches import DEPTHS, PairFrames, pair_frames
+from manipose_mj.grasp_sampling.approaches import COS, DEPTHS, PairFrames, pair_frames
 from manipose_mj.grasp_sampling.grasp_choice import clear_of_plane, diverse
 from manipose_mj.grasp_sampling.grasp_fit import Candidates, ObjectCloud, fit_pairs
 from manipose_mj.grasp_sampling.gripper_clearance import hand_free
+from manipose_mj.grasp_sampling.touch_points import SurfacePoints
 
 _COUNT = 200  # grasps to return
 _ENDS = 3000  # points of the surface among which pairs are looked for
@@ -28,6 +29,10 @@ _BLOCK = 100  # of these at a time
 _ENOUGH = 600  # candidates to choose from
 _LEVEL = 0.35  # sine of how far from level pads may close that are turned to close level
 _LEVEL_PAIRS = 250  # for each pose
+# Candidates that are clear of the support in a pose to be held in, below which hands also come tilted
+# about the line that they close along; and the cosine to straight from above down to which they do.
+_SCARCE, _TILTED = 40, 0.25
+_STRAIGHT = np.arange(len(COS)) < len(DEPTHS)  # of the approaches the first is the one from above
 # Lengths of the sum of two ups between which a hand can come halfway: 10 to 140 degrees apart.
 _HALFWAY = (0.68, 1.99)
 
@@ -73,7 +78,7 @@ def _candidates(
     found = []
     for up in above:
         frames = pair_frames(ends, pairs, np.broadcast_to(up, (len(pairs), 3)))
-        found.append(_from_above(cloud, frames, up, gripper))
+        found.append(_from_above(cloud, frames, up, gripper, _STRAIGHT))
     enough = sum(map(len, found)) + _ENOUGH
     for start in range(0, len(pairs), _BLOCK):
         some = pairs[start : start + _BLOCK]
@@ -83,6 +88,7 @@ def _candidates(
         found.append(fit_pairs(cloud, frames.take(reached), free[reached], gripper))
         if sum(map(len, found)) >= enough:
             break
+    found += _tilted(cloud, ends, pairs, held_in, Candidates.joined(found), gripper)
     number = np.repeat(np.arange(len(found)), [len(each) for each in found])
     return Candidates.joined(found), (number >= len(held_in)) & (number < len(above))
 
@@ -98,12 +104,38 @@ def _between(ups: Float[np.ndarray, "p 3"]) -> list[Float[np.ndarray, "3"]]:
     return found
 
 
+def _tilted(
+    cloud: ObjectCloud,
+    ends: SurfacePoints,
+    pairs: Int[np.ndarray, "p 2"],
+    held_in: Sequence[StablePose],
+    found: Candidates,
+    gripper: ParallelJaw,
+) -> list[Candidates]:
+    """More grasps for the poses to be held in that hardly any found so far is clear of the support in.
+
+    What is thin and too wide across is taken by few of its parts only: under a board, not straight from above.
+    """
+    clear = clear_of_plane(found.poses, found.widths, held_in, gripper).sum(axis=0)
+    more = []
+    for pose, count in zip(held_in, clear, strict=True):
+        if count < _SCARCE:
+            up = pose.rotation[2]
+            frames = pair_frames(ends, pairs, np.broadcast_to(up, (len(pairs), 3)))
+            hands = (COS > _TILTED) & ~_STRAIGHT
+            more.append(_from_above(cloud, frames, up, gripper, hands))
+    return more
+
+
 def _from_above(
-    cloud: ObjectCloud, frames: PairFrames, up: Float[np.ndarray, "3"], gripper: ParallelJaw
+    cloud: ObjectCloud,
+    frames: PairFrames,
+    up: Float[np.ndarray, "3"],
+    gripper: ParallelJaw,
+    hands: Bool[np.ndarray, "hands"],
 ) -> Candidates:
-    """Grasps straight from above, by pads that close level."""
+    """Grasps by these of the hands, by pads that close level."""
     level = frames.levelled(up, _LEVEL).take(slice(_LEVEL_PAIRS))
-    free = hand_free(cloud.coarse, level, gripper)
-    free[:, len(DEPTHS) :] = False  # of the approaches the first is the one from above
+    free = hand_free(cloud.coarse, level, gripper) & hands
     reached = np.flatnonzero(free.any(axis=1))
     return fit_pairs(cloud, level.take(reached), free[reached], gripper)

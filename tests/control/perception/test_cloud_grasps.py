@@ -101,6 +101,16 @@ def test_a_bar_is_taken_from_above_however_it_lies(angle):
     assert len(grasps) <= 200 and (grasps.widths < 0.03).all()
 
 
+def test_what_only_a_neck_is_narrow_of_is_taken_from_aslant_too():
+    slab, neck = prism(0.1, 0.03), prism(0.06, 0.016).hulls[0] * [0.1, 1, 1] + 0.088 * X
+    shape = replace(slab, hulls=(*slab.hulls, neck), rests=slab.rests[:1])
+    nothing = np.empty((0, 3))
+    lying = resting(shape, np.eye(3))
+    grasps = cloud_grasps(observed_surface(nothing, nothing, shape), [lying], [lying])
+    down = -grasps.poses[grasps.clear[:, 0], 2, 2]
+    assert (down > 0.99).any() and ((down < 0.9).sum() >= 4), "none comes tilted"
+
+
 def view(points: np.ndarray, normals: np.ndarray) -> ObjectView:
     nothing: Any = None
     pose = np.eye(4)
