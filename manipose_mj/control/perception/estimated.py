@@ -30,6 +30,7 @@ from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.in_hand import InHand, is_gone
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
 from manipose_mj.control.perception.objects.asked_objects import asked_rotations, in_the_open
+from manipose_mj.control.perception.objects.goal_depth import as_unsure_as_deep
 from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
 from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
@@ -107,8 +108,7 @@ class EstimatedPerception:
         self._held: InHand | None = None
         self._seen: dict[str, SensedPose] = {}  # where what is known showed last
         self._lost: set[str] = set()  # what was not where the hand should have it
-        # Objects that lie otherwise than their grasps were made for.
-        self._dropped: set[str] = set()
+        self._dropped: set[str] = set()  # what lies otherwise than its grasps were made for
         self._time = self._looked = -1.0
         self._keys = random_keys(0)
         self.sources: Mapping[str, str] = {
@@ -265,9 +265,7 @@ class EstimatedPerception:
                 self._dropped.remove(name)
             self._time = time
         scene = self._planning_scene()
-        objects = {
-            name: self._estimate(name, sensed, scene) for name, sensed in self._known.items()
-        }
+        objects = {n: self._estimate(n, sensed, scene) for n, sensed in self._known.items()}
         parts = self._world.parts(scene, objects)
         self.last_estimates = tuple(
             EstimatedPose(name, sensed.pose, sensed.confidence, sensed.camera)
@@ -385,7 +383,7 @@ class EstimatedPerception:
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
         body, kind = self._world.body(name), self._kinds()[name]
-        return ObjectEstimate(
+        found = ObjectEstimate(
             name=name,
             pose=sensed.pose,
             label=sensed.shape.label,
@@ -398,3 +396,4 @@ class EstimatedPerception:
             guessed_frame=not kind.in_catalogue
             or kind.object_type != sensed.shape.label.object_type,
         )
+        return as_unsure_as_deep(found, self._task.goals, scene)

@@ -137,6 +137,14 @@ class PlanningScene:
             depths[alike] = np.maximum(depths[alike], max(-distance, _HARDLY))
         return depths
 
+    def depth_in_fixed(self, geoms: Bool[np.ndarray, "ngeom"]) -> float:
+        """How deep these geoms are in what neither is loose nor of the robot [m]; zero where they touch none of it."""
+        contacts = self.collision_model.contacts_of(self.positions, geoms)
+        first, second = contacts.geoms.T
+        others = np.where(geoms[first], second, first)
+        fixed = ~(geoms | self.robot | self.collision_model.loose)[others]
+        return float(-contacts.distances[fixed].min(initial=0.0))
+
     def touching(
         self, geoms: Bool[np.ndarray, "ngeom"], distance: float
     ) -> list[tuple[int, float]]:

@@ -15,6 +15,7 @@ from manipose_mj.control.grasping.pick import pick_object
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.camera_rig import SENSORS
 from manipose_mj.control.perception.estimated import EstimatedPerception
+from manipose_mj.control.perception.objects.goal_depth import as_unsure_as_deep
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
 from manipose_mj.control.perception.objects.object_views import ObjectViews
 from manipose_mj.control.perception.pose_sensing import EstimatedPose
@@ -30,6 +31,7 @@ from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.ppf_jax import estimator
 from manipose_mj.ppf_jax.estimator import PoseEstimate
 from manipose_mj.tasks.core.config import EpisodeSpec
+from manipose_mj.tasks.goals import PoseGoal
 from tests.control.perception.recalled import CUP, TARGET_POSE, Recalled, config_of, perception_of
 
 
@@ -122,6 +124,23 @@ def test_an_uncertain_estimate_gives_way_to_a_surer_one_that_fits_as_well(
     cup.step(np.append(cup.task.robot.configuration(cup.physics)[0], 0.08))
     now = perception.observe().objects["object"].label_pose
     np.testing.assert_allclose(now, nearby if replaced else pose, atol=1e-9)
+
+
+def test_what_lies_in_the_table_where_a_goal_has_it_is_as_uncertain(cup, truth):
+    perception = perception_of(cup, Recalled(*truth))
+    perception.reset(0)
+    estimate = perception.observe()
+    obj = replace(estimate.objects["object"], uncertainty=0.001)
+
+    def uncertainty(sunk: float, name: str = "object") -> float:
+        goal = PoseGoal(name, truth[0] - sunk * np.eye(4)[2][:, None] * np.eye(4)[3])
+        return as_unsure_as_deep(obj, (goal,), estimate.scene).uncertainty
+
+    assert uncertainty(-0.01) == 0.001, "above the table it touches nothing"
+    assert uncertainty(0.008) - uncertainty(0.005) == pytest.approx(0.003, abs=2e-4)
+    assert 0.003 < uncertainty(0.005) < 0.008
+    assert uncertainty(0.05) == pytest.approx(0.1 * truth[1].max()), "its pose must be wrong"
+    assert uncertainty(0.005, "other") == 0.001
 
 
 def test_what_is_held_follows_the_hand(cup, truth):
