@@ -21,8 +21,6 @@ from manipose_mj.tasks.goals import Goal, OrientationGoal, PoseGoal, UprightGoal
 from manipose_mj.tasks.goals.conditions import Tolerance
 
 RestGoal = PoseGoal | OrientationGoal | UprightGoal
-# By how much more than a task tolerates an object is seen to lie wrong, before that is believed.
-_BEYOND = 1.15
 
 
 def transport_plans(
@@ -57,8 +55,8 @@ def lie_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
             continue
         pose = estimate.objects[frame.object].label_pose
         shift, turn = pose_error(pose, np.asarray(frame.pose), frame.symmetry)
-        moved = frame.translation_counts and shift > _BEYOND * most.translation
-        if moved or (frame.rotation_counts and turn > _BEYOND * most.rotation):
+        moved = frame.translation_counts and shift > most.translation
+        if moved or (frame.rotation_counts and turn > most.rotation):
             return True
     return False
 

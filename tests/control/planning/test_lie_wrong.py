@@ -24,7 +24,8 @@ def goal_off(shift: float, turn: float) -> PoseGoal:
 
 
 @pytest.mark.parametrize(
-    ("shift", "degrees", "wrong"), [(0.015, 10, False), (0.03, 0, True), (0.0, 30, True)]
+    ("shift", "degrees", "wrong"),
+    [(0.015, 10, False), (0.03, 0, True), (0.0, 30, True), (0.021, 0, True), (0.0, 16, True)],
 )
 def test_what_toppled_or_rolled_away_lies_wrong(shift, degrees, wrong):
     assert lie_wrong((goal_off(shift, np.deg2rad(degrees)),), scene([CAN], [])) is wrong
