@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,7 +97,7 @@ def pick_object(
       obj: What to take.
       destinations: `T_world_label` that it shall go to, any of them; empty if it only is to be held.
       slipped: `T_tcp_label` of grasps that did not hold.
-      thorough: Whether to try many more grasps in the end, which takes long.
+      thorough: Whether to try many more grasps in the end, and to sample more if it can be, which takes long.
 
     Raises:
       StageFailure: There is none; the reason says at which filter the last ones fell.
@@ -117,6 +118,10 @@ def pick_object(
             return _pick(allowing, estimate, obj, destinations, candidates, effort, posture)
         except StageFailure as failure:
             failures.append(failure)
+    if thorough and obj.sample_more is not None:
+        more = object_grasps(replace(obj, sample_grasps=obj.sample_more))
+        with suppress(StageFailure):
+            return _pick(planner, estimate, obj, destinations, more, 1, 0)
     raise failures[0] from None
 
 

@@ -22,11 +22,11 @@ from manipose_mj.grasp_sampling.grasp_fit import Candidates, ObjectCloud, fit_pa
 from manipose_mj.grasp_sampling.gripper_clearance import hand_free
 from manipose_mj.grasp_sampling.touch_points import SurfacePoints
 
-_COUNT = 200  # grasps to return
+COUNT, MANY = 200, 1000  # grasps to return; and where these do not do
 _ENDS = 3000  # points of the surface among which pairs are looked for
 _SEEDS = 800  # of them whose partners are looked for
 _BLOCK = 100  # of these at a time
-_ENOUGH = 600  # candidates to choose from
+_ENOUGH = 3  # candidates to choose from, for each grasp
 _LEVEL = 0.35  # sine of how far from level pads may close that are turned to close level
 _LEVEL_PAIRS = 250  # for each pose
 # Candidates that are clear of the support in a pose to be held in, below which hands also come tilted
@@ -38,7 +38,10 @@ _HALFWAY = (0.68, 1.99)
 
 
 def cloud_grasps(
-    cloud: ObjectCloud, held_in: Sequence[StablePose], rests: Sequence[StablePose]
+    cloud: ObjectCloud,
+    held_in: Sequence[StablePose],
+    rests: Sequence[StablePose],
+    count: int = COUNT,
 ) -> GraspSet:
     """Antipodal grasps, best first.
 
@@ -46,14 +49,15 @@ def cloud_grasps(
       cloud: The observed surface, in the label's frame.
       held_in: The object's poses in which the hand will take it or let go of it.
       rests: For `GraspSet.clear`, in this order.
+      count: The most grasps to return.
     """
     gripper = ParallelJaw()
     rng = np.random.default_rng(0)
-    candidates, halfway = _candidates(cloud, held_in, rests, gripper, rng)
+    candidates, halfway = _candidates(cloud, held_in, rests, gripper, rng, _ENOUGH * count)
     poses, widths = candidates.poses, candidates.widths
     clear = clear_of_plane(poses, widths, rests, gripper)
     held = clear_of_plane(poses, widths, held_in, gripper)
-    chosen = diverse(candidates, np.column_stack([held, halfway]), _COUNT)
+    chosen = diverse(candidates, np.column_stack([held, halfway]), count)
     return GraspSet(poses[chosen], widths[chosen], clear[chosen])
 
 
@@ -63,8 +67,11 @@ def _candidates(
     rests: Sequence[StablePose],
     gripper: ParallelJaw,
     rng: np.random.Generator,
+    more: int,
 ) -> tuple[Candidates, Bool[np.ndarray, "n"]]:
     """Grasps to choose from: of every side, from above in the poses to be held in, and halfway between them.
+
+    Of every side `more` will do.
 
     Returns:
       The grasps, and which of them are halfway.
@@ -79,7 +86,7 @@ def _candidates(
     for up in above:
         frames = pair_frames(ends, pairs, np.broadcast_to(up, (len(pairs), 3)))
         found.append(_from_above(cloud, frames, up, gripper, _STRAIGHT))
-    enough = sum(map(len, found)) + _ENOUGH
+    enough = sum(map(len, found)) + more
     for start in range(0, len(pairs), _BLOCK):
         some = pairs[start : start + _BLOCK]
         frames = pair_frames(ends, some, ups[np.arange(len(some)) % len(ups)])
@@ -117,14 +124,14 @@ def _tilted(
     What is thin and too wide across is taken by few of its parts only: under a board, not straight from above.
     """
     clear = clear_of_plane(found.poses, found.widths, held_in, gripper).sum(axis=0)
-    more = []
+    added = []
     for pose, count in zip(held_in, clear, strict=True):
         if count < _SCARCE:
             up = pose.rotation[2]
             frames = pair_frames(ends, pairs, np.broadcast_to(up, (len(pairs), 3)))
             hands = (COS > _TILTED) & ~_STRAIGHT
-            more.append(_from_above(cloud, frames, up, gripper, hands))
-    return more
+            added.append(_from_above(cloud, frames, up, gripper, hands))
+    return added
 
 
 def _from_above(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from dm_control import mjcf
@@ -25,6 +25,7 @@ from manipose_mj.control.perception.camera_rig import (
     SPARE_CAMERAS,
     standing_cameras,
 )
+from manipose_mj.control.perception.cloud_grasps import COUNT, MANY
 from manipose_mj.control.perception.flat_objects import sensed_if_flat
 from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.in_hand import InHand, is_gone
@@ -104,7 +105,7 @@ class EstimatedPerception:
         self._close_views = ObjectViews(task.task_observables, sensors.camera_names)
         self._sights = SceneViews(task.task_observables, usual)
         self._known: dict[str, SensedPose] = {}
-        self._grasps: dict[str, Callable[[], GraspSet]] = {}
+        self._grasps: dict[str, Callable[..., GraspSet]] = {}
         self._held: InHand | None = None
         self._seen: dict[str, SensedPose] = {}  # where what is known showed last
         self._lost: set[str] = set()  # what was not where the hand should have it
@@ -236,9 +237,7 @@ class EstimatedPerception:
         more = more or self._more_views
         kind, views = self._kinds()[name], self._views.of(self._physics, name)
         sensed = self._sensed(name, views, shapes_of(kind), more)
-        if sensed is None:
-            return None
-        return sensed_if_flat(kind, sensed, views or more.of(self._physics, name))
+        return sensed and sensed_if_flat(kind, sensed, views or more.of(self._physics, name))
 
     def _build(self) -> None:
         for name in self._known:
@@ -358,18 +357,18 @@ class EstimatedPerception:
             return second
         return second if second.confidence > sensed.confidence else sensed
 
-    def _grasps_of(self, name: str, by: ObjectViews | None = None) -> Callable[[], GraspSet]:
+    def _grasps_of(self, name: str, by: ObjectViews | None = None) -> Callable[..., GraspSet]:
         """Samples grasps of what is seen now, for the pose estimated and those that goals ask for; once, when asked to."""
         sensed = self._known[name]
         symmetries = {each: other.shape.label.symmetry for each, other in self._known.items()}
         rotations = asked_rotations(self._task.goals, name, symmetries)
         views = (by or self._views).of(self._physics, name)
-        views = views or self._more_views.of(self._physics, name)
+        views, objects = views or self._more_views.of(self._physics, name), self._task.objects
 
         @cache
-        def sample() -> GraspSet:
+        def sample(count: int = COUNT) -> GraspSet:
             return sensed_grasps(
-                self._grasp_source, sensed, views, rotations, lambda: self._task.objects[name].asset
+                self._grasp_source, sensed, views, rotations, lambda: objects[name].asset, count
             )
 
         return sample
@@ -396,4 +395,6 @@ class EstimatedPerception:
             guessed_frame=not kind.in_catalogue
             or kind.object_type != sensed.shape.label.object_type,
         )
+        if self._grasp_source == "cloud":
+            found = replace(found, sample_more=partial(self._grasps[name], MANY))
         return as_unsure_as_deep(found, self._task.goals, scene)

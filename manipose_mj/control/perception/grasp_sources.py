@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.assets.gripper import ParallelJaw
-from manipose_mj.control.perception.cloud_grasps import cloud_grasps
+from manipose_mj.control.perception.cloud_grasps import COUNT, cloud_grasps
 from manipose_mj.control.perception.objects.known_shapes import KnownShape
 from manipose_mj.control.perception.objects.object_views import ObjectView, seen_points
 from manipose_mj.control.perception.observed_surface import observed_surface
@@ -29,6 +29,7 @@ def sensed_grasps(
     views: Sequence[ObjectView],
     rotations: Sequence[Float[np.ndarray, "3 3"]],
     asset: Callable[[], Asset],
+    count: int = COUNT,
 ) -> GraspSet:
     """Grasps of an object in its label's frame.
 
@@ -39,6 +40,7 @@ def sensed_grasps(
       views: That led to them.
       rotations: `R_world_label` that goals ask for.
       asset: The object; called for `"annotated"` alone.
+      count: The most of a cloud.
     """
     shape = sensed.shape
     if source == "shape":
@@ -52,12 +54,12 @@ def sensed_grasps(
     held_in = [resting(shape, rotation) for rotation in (sensed.pose[:3, :3], *rotations)]
     if not rotations:  # it may be set down on any side
         held_in += shape.rests[:_COMMON]
-    grasps = cloud_grasps(cloud, held_in, shape.rests)
+    grasps = cloud_grasps(cloud, held_in, shape.rests, count)
     if len(grasps) >= _FEW:
         return grasps
     # A cloud that contradicts itself, as of cameras that disagree, leaves a hand no room: believe the shape alone.
     nothing = np.empty((0, 3))
-    return cloud_grasps(observed_surface(nothing, nothing, shape), held_in, shape.rests)
+    return cloud_grasps(observed_surface(nothing, nothing, shape), held_in, shape.rests, count)
 
 
 def resting(shape: KnownShape, rotation: Float[np.ndarray, "3 3"]) -> StablePose:

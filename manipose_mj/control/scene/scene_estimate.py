@@ -36,6 +36,7 @@ class ObjectEstimate:
       uncertainty: How far its surface may be from where the planning scene has it [m].
       guessed_frame: Whether where its label is in it is but a guess, its shape being that of its own cloud: a pose that
         is asked for then leaves it a little in the air or in what it shall lie on.
+      sample_more: Gives many more grasps, for where `grasps` do not do; None: there are no others.
     """
 
     name: str
@@ -48,6 +49,7 @@ class ObjectEstimate:
     category: str = ""
     uncertainty: float = 0.0
     guessed_frame: bool = False
+    sample_more: Callable[[], GraspSet] | None = None
 
     @property
     def grasps(self) -> GraspSet:

@@ -1,6 +1,8 @@
-"""After an object slipped out of the hand, it is taken another way."""
+"""After an object slipped out of the hand, or where no grasp does, it is taken another way."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.grasping.pick import pick_object
 from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.failures import StageFailure
 from manipose_mj.poses import invert
 from tests.few_objects import load
 
@@ -46,3 +49,14 @@ def test_where_all_slipped_the_first_is_taken_again(scene):
         invert(pose @ turn) @ obj.label.pose for pose in obj.grasps.poses for turn in both
     ]
     np.testing.assert_allclose(_taken(scene, everything), first, atol=1e-6)
+
+
+def test_where_no_grasp_does_more_are_sampled_if_there_is_time(scene):
+    estimate, arm = scene
+    planner = MotionPlanner(estimate.scene, arm, 0.02, np.random.default_rng(0))
+    obj = estimate.objects["object"]
+    wide = replace(obj.grasps, widths=np.ones(len(obj.grasps)))
+    unsure = replace(obj, sample_grasps=lambda: wide, sample_more=obj.sample_grasps)
+    assert pick_object(planner, estimate, unsure, (), thorough=True).width < 0.08
+    with pytest.raises(StageFailure, match="none of 0 grasps"):
+        pick_object(planner, estimate, unsure, ())

@@ -138,5 +138,7 @@ def test_a_cloud_that_contradicts_itself_is_not_believed():
     scattered = points + rng.normal(0, 0.03, points.shape)  # cameras that disagree by 3 cm
     sensed = SensedPose(np.eye(4), shape, 0.01, 0.95, "front")
     asset: Any = None
-    grasps = sensed_grasps("cloud", sensed, (view(scattered, normals),), (), lambda: asset)
+    views = (view(scattered, normals),)
+    grasps = sensed_grasps("cloud", sensed, views, (), lambda: asset)
     assert len(grasps) >= 100
+    assert len(sensed_grasps("cloud", sensed, views, (), lambda: asset, 400)) > len(grasps)
