@@ -32,7 +32,7 @@ from manipose_mj.control.perception.in_hand import InHand, is_gone
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
 from manipose_mj.control.perception.objects.asked_objects import asked_rotations, in_the_open
 from manipose_mj.control.perception.objects.goal_depth import as_unsure_as_deep
-from manipose_mj.control.perception.objects.object_kinds import ObjectKind, object_kind
+from manipose_mj.control.perception.objects.object_kinds import ObjectKind, kinds_of
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
 from manipose_mj.control.perception.objects.shape_fits import OneShape, ShapeFitter, shapes_of
 from manipose_mj.control.perception.pose_sensing import (
@@ -129,7 +129,7 @@ class EstimatedPerception:
         self._keys = random_keys(seed)
         self._held, self._dropped, self._lost = None, set(), set()
         self._known, self._seen, self._grasps = {}, {}, {}
-        for kind in self._kinds().values():
+        for kind in kinds_of(self._task.objects).values():
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
         self._find_objects()
@@ -226,7 +226,7 @@ class EstimatedPerception:
 
     def _find_objects(self) -> None:
         """Estimate what is seen for the first time."""
-        for name in self._kinds():
+        for name in kinds_of(self._task.objects):
             sensed = None if name in self._known else self._looked_at(name)
             if sensed is not None:
                 self._known[name] = sensed
@@ -235,7 +235,7 @@ class EstimatedPerception:
     def _looked_at(self, name: str, more: ObjectViews | None = None) -> SensedPose | None:
         """The estimate of what may have any shape of its kind; by `more` views, of all standing cameras, if need be."""
         more = more or self._more_views
-        kind, views = self._kinds()[name], self._views.of(self._physics, name)
+        kind, views = kinds_of(self._task.objects)[name], self._views.of(self._physics, name)
         sensed = self._sensed(name, views, shapes_of(kind), more)
         return sensed and sensed_if_flat(kind, sensed, views or more.of(self._physics, name))
 
@@ -256,7 +256,9 @@ class EstimatedPerception:
         time = float(self._physics.data.time)
         if time != self._time:
             tcp = self._planning_scene().tcp_pose(joints)
-            self._world.follow(tcp)
+            moved = self._world.follow(tcp, {n: s.pose for n, s in self._known.items()})
+            for name in moved.keys() - {self._held_name}:  # what lies in drawers, seen or not
+                self._known[name] = self._seen[name] = replace(self._known[name], pose=moved[name])
             for name in self._known:
                 self._known[name] = self._updated(name, tcp)
             for name in self._dropped - {self._held_name}:
@@ -296,10 +298,6 @@ class EstimatedPerception:
         """The scene as the latest estimates have it."""
         poses = {name: sensed.pose for name, sensed in self._known.items()}
         return self._world.observed(*self.robot(), poses)
-
-    def _kinds(self) -> Mapping[str, ObjectKind]:
-        """The kind of each object: all that is told about it."""
-        return {name: object_kind(entity.asset) for name, entity in self._task.objects.items()}
 
     def _updated(self, name: str, tcp: Float[np.ndarray, "4 4"]) -> SensedPose:
         """The pose of an object now: where it was, or the hand has brought it, if new views fit that; else as they show."""
@@ -342,7 +340,7 @@ class EstimatedPerception:
     ) -> SensedPose | None:
         """From these views; from more, if there are, where these leave an object uncertain, are of one side of it, or walls
         hide the same part of it from them."""
-        estimator, sensed = self._load(self._kinds()[name]), None
+        estimator, sensed = self._load(kinds_of(self._task.objects)[name]), None
         if more is None or name not in self._enclosed:
             sensed = sense_pose(estimator, self._with_mesh(name, views), shapes, self._keys)
         one_side = len(views) < 2
@@ -381,7 +379,7 @@ class EstimatedPerception:
         return tuple(replace(view, mesh=mesh) for view in views)
 
     def _estimate(self, name: str, sensed: SensedPose, scene: PlanningScene) -> ObjectEstimate:
-        body, kind = self._world.body(name), self._kinds()[name]
+        body, kind = self._world.body(name), kinds_of(self._task.objects)[name]
         found = ObjectEstimate(
             name=name,
             pose=sensed.pose,

@@ -14,19 +14,21 @@ from manipose_mj.control.furniture.estimated_furniture import EstimatedFurniture
 from manipose_mj.control.furniture.part_sensing import PartSensor, sense_parts
 from manipose_mj.control.furniture.scene_cloud import SceneViews
 from manipose_mj.control.furniture.shapes.boxes import Boxes, no_boxes
+from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel
 from manipose_mj.control.furniture.surroundings import surrounding_boxes
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.estimated_scene import PREFIX, add_object, without_looks
-from manipose_mj.control.perception.worlds import Hulls
+from manipose_mj.control.perception.worlds import Hulls, Poses
 from manipose_mj.control.scene.collision_model import CollisionModel, ScenePositions, subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.mjcf.panda.robot import Panda
-from manipose_mj.poses import pose_to_vector
+from manipose_mj.poses import invert, pose_to_vector
 from manipose_mj.tasks.core.task import ManipulationTask
 
 _ROBOT = "panda"
 _BASE = f"{PREFIX}furniture"
+_IN_DRAWER = 0.01  # beyond its cavity, which is an estimate [m]
 
 
 class SensedWorld:
@@ -55,6 +57,7 @@ class SensedWorld:
         self._task, self._physics = task, physics
         self._views = SceneViews(task.task_observables, cameras)
         self._furniture = EstimatedFurniture(task, physics, self._views, front_cameras, sense)
+        self._followed: FurnitureModel | None = None  # as objects in drawers were taken along last
         self._robot = _robot_alone()
         self._surroundings: Boxes = no_boxes()
         self._model: CollisionModel | None = None
@@ -79,6 +82,7 @@ class SensedWorld:
           StageFailure: A part that a goal is about is not found.
         """
         self._furniture.reset(key)
+        self._followed = self._furniture.model
         clouds = [
             self._views.cloud(self._physics, mask, normals=False).points
             for mask in self._task.surroundings_masks
@@ -147,9 +151,13 @@ class SensedWorld:
         carried = {name: (self.body(_extra_of(name)),) for name in self._with_extra}
         return self._furniture.parts(bodies, geoms, objects, carried)
 
-    def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
+    def follow(
+        self, tcp_pose: Float[np.ndarray, "4 4"], objects: Poses
+    ) -> dict[str, Float[np.ndarray, "4 4"]]:
         """By the hand where it holds a part, by cameras else."""
         self._furniture.follow(tcp_pose)
+        before, self._followed = self._followed, self._furniture.model
+        return _gone_along(before, self._followed, objects)
 
     def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Remember how the hand holds a handle."""
@@ -176,6 +184,28 @@ class SensedWorld:
 def _extra_of(name: str) -> str:
     """The body that stands for what else was seen on a part, by the name of the part or of its body."""
     return f"{name}-extra"
+
+
+def _gone_along(
+    before: FurnitureModel | None, now: FurnitureModel | None, objects: Poses
+) -> dict[str, Float[np.ndarray, "4 4"]]:
+    """Where what lay in drawers is once these have moved."""
+    moved: dict[str, Float[np.ndarray, "4 4"]] = {}
+    if before is None or now is None:
+        return moved
+    parts = {part.name: part for part in now.parts}
+    for part in before.parts:
+        cavity, after = part.part.cavity, parts.get(part.name)
+        if cavity is None or not cavity.moves_with_part or after is None:
+            continue
+        if after.opening == part.opening:
+            continue
+        to_part = invert(before.pose @ part.motion(part.opening))
+        for name, pose in objects.items():
+            place = (to_part @ pose)[:3, 3] - cavity.center
+            if (np.abs(place) < cavity.extents / 2 + _IN_DRAWER).all():
+                moved[name] = now.pose @ after.motion(after.opening) @ to_part @ pose
+    return moved
 
 
 def _robot_alone() -> mujoco.MjSpec:

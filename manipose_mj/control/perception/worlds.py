@@ -16,6 +16,7 @@ from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate
 from manipose_mj.tasks.core.task import ManipulationTask
 
+Poses = Mapping[str, Float[np.ndarray, "4 4"]]
 Hulls = Mapping[str, Sequence[Float[np.ndarray, "_ 3"]]]
 
 
@@ -62,8 +63,14 @@ class World(Protocol):
         """Drawers and doors, by name."""
         ...
 
-    def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
-        """Time has passed: find out how far parts are open, with the TCP at `T_world_tcp`."""
+    def follow(
+        self, tcp_pose: Float[np.ndarray, "4 4"], objects: Poses
+    ) -> dict[str, Float[np.ndarray, "4 4"]]:
+        """Time has passed: find out how far parts are open, with the TCP at `T_world_tcp`.
+
+        Returns:
+          Poses, by name, of those objects that have gone along with a drawer.
+        """
         ...
 
     def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
@@ -129,8 +136,11 @@ class SimulatedWorld:
         """All of them, true."""
         return self._furniture.parts(scene, objects)
 
-    def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
+    def follow(
+        self, tcp_pose: Float[np.ndarray, "4 4"], objects: Poses
+    ) -> dict[str, Float[np.ndarray, "4 4"]]:
         """Nothing to find out."""
+        return {}
 
     def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Nothing to remember."""

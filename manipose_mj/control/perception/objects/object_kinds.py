@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import ObjectType
+from manipose_mj.mjcf.objects import RigidObject
 
 
 @dataclass(frozen=True)
@@ -36,3 +38,8 @@ def object_kind(asset: Asset) -> ObjectKind:
     if row is not None:
         return ObjectKind(asset.category, row.object_type, True)
     return ObjectKind(asset.category, asset.object_type, False)
+
+
+def kinds_of(objects: Mapping[str, RigidObject]) -> dict[str, ObjectKind]:
+    """The kind of each object of a task, by its name: all that is told about it."""
+    return {name: object_kind(entity.asset) for name, entity in objects.items()}
