@@ -157,7 +157,7 @@ class SensedWorld:
         """By the hand where it holds a part, by cameras else."""
         self._furniture.follow(tcp_pose)
         before, self._followed = self._followed, self._furniture.model
-        return _gone_along(before, self._followed, objects)
+        return gone_along(before, self._followed, objects)
 
     def hold(self, name: str | None, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Remember how the hand holds a handle."""
@@ -186,7 +186,7 @@ def _extra_of(name: str) -> str:
     return f"{name}-extra"
 
 
-def _gone_along(
+def gone_along(
     before: FurnitureModel | None, now: FurnitureModel | None, objects: Poses
 ) -> dict[str, Float[np.ndarray, "4 4"]]:
     """Where what lay in drawers is once these have moved."""
