@@ -43,10 +43,8 @@ MAX_STAGED_PLANS = (
 )
 MAX_LOOKS = 6  # into what was opened, where furniture is estimated
 MAX_FAILED_MOVES = 30  # the same in clutter, where each move is a plan
-_AT_END, _TO_REST = (
-    0.5,
-    3.0,
-)  # after the last step; the same, where nobody is told whether the goal is met [s]
+# After the last step; for what rolls in a drawer to come to rest, where nobody is told whether the goal is met [s].
+_AT_END, _TO_REST = 0.5, 3.0
 _LED_ON = 0.08  # of its range, by which a part has moved that a plan has led on
 _WORTH_ANOTHER_PLAN = ("grasp", "plan", "motion")
 
@@ -215,7 +213,6 @@ class Baseline:
                     self.status = "done"
                     yield from executor.wait(_AT_END)
                     if step_by_step or not self._falls_short(executor):
-                        # What rolls in a drawer comes to rest.
                         yield from executor.wait(_TO_REST if scene.perception.feels_joints else 0.0)
                         return
                     falls_short = True

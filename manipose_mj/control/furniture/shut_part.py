@@ -38,10 +38,8 @@ _LONG = 1.5  # times as long as wide: a bar
 # Of handles that look like a sensed one: how near another that was sensed would be it [m], their share of the confidence.
 _KNOWN, _TWIN = 0.04, 0.8
 _SURE = 0.25  # confidence of drawers that tell of others in their column, or row
-_LEVEL, _ALIKE = (
-    0.015,
-    0.010,
-)  # how far handles in a row differ in height, and in half of their lengths [m]
+# How far handles in a row differ in height, and in half of their lengths [m].
+_LEVEL, _ALIKE = 0.015, 0.010
 
 
 class ShutPart:

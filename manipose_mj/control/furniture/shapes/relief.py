@@ -75,9 +75,8 @@ def relief(points: Float[np.ndarray, "n 3"], front: float) -> Relief:
     height, counts = np.full(shape, -np.inf), np.zeros(shape, int)
     np.maximum.at(height, cells, seen[:, 0])
     np.add.at(counts, cells, 1)
-    shown = ndimage.binary_dilation(
-        counts > 0, np.ones((3, 3))
-    )  # pixels may be further apart than cells
+    # Pixels may be further apart than cells.
+    shown = ndimage.binary_dilation(counts > 0, np.ones((3, 3)))
     height = ndimage.median_filter(_filled(height), 3)
     base = ndimage.grey_opening(height, round(_WIDEST / _CELL))
     out = height - base

@@ -77,9 +77,8 @@ def column_of(
             rest &= away > away[on].max()
             low, high = local[on].min(axis=0), local[on].max(axis=0)
             plumb = abs(float(np.median(local[on, 1]) - np.median(local[own, 1]))) < _AS_WIDE / 2
-            goes_on = (
-                beside & (local[:, 2] > low[2]) & (local[:, 2] < high[2])
-            )  # an edge of a board
+            # The edge of a board goes on beside the column.
+            goes_on = beside & (local[:, 2] > low[2]) & (local[:, 2] < high[2])
             alike = plumb and goes_on.sum() < _FEW and _as_large(local[own], local[on])
             if alike and _shown_around(flush, low[1:], high[1:]) >= _SIDES_OF_BAR:
                 found.append(handle.origin + np.array([0.0, 0.0, (low[2] + high[2]) / 2]))
