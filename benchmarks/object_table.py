@@ -2,7 +2,7 @@
 
     manipose assets build ycb PATH --out SCANS/ycb
     python benchmarks/object_table.py --assets SCANS/ycb [SCANS/gso ...] [--tasks single_object/target_pose ...]
-        [--pose estimated] [--only NAME ...] [--skip NAME ...] [--every N] [--seeds 0 1] [--json FILE]
+        [--pose estimated] [--only NAME ...] [--skip NAME ...] [--every N] [--seeds 0 1] [--jobs 2] [--json FILE]
     python benchmarks/object_table.py --drawn --tasks "articulated/take_out_*" [--seeds 0 1]
 
 Without a folder: one test object of each rigid category of the catalogue, `--each` another one (0: the first); with
@@ -28,6 +28,7 @@ from manipose_mj.console.process import one_thread_per_process
 one_thread_per_process()
 
 import numpy as np  # noqa: E402
+from joblib import Parallel, delayed  # noqa: E402
 
 from manipose_mj.assets import catalogue  # noqa: E402
 from manipose_mj.assets.asset import Asset  # noqa: E402
@@ -81,14 +82,23 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=[], help="names of assets")
     parser.add_argument("--skip", nargs="+", default=[], help="names of assets to leave out")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--jobs", type=int, default=1, help="episodes at the same time")
     parser.add_argument("--json", type=Path, help="where to write the rows")
     options = parser.parse_args()
-    tasks, rows = tasks_named(options.tasks), []
-    for task in tasks:
-        for asset in _chosen(options):
-            for row in played(task, asset, options.seeds, options.pose):
-                rows.append(row)
-                print(line_of(row), flush=True)
+    tasks, chosen = tasks_named(options.tasks), _chosen(options)
+    calls = (
+        delayed(played)(task, asset, [seed], options.pose)
+        for task in tasks
+        for asset in chosen
+        for seed in options.seeds
+    )
+    rows: list[Row] = []
+    for some in Parallel(n_jobs=options.jobs, return_as="generator")(calls):
+        for row in some:
+            if row in rows:  # the task takes the object with no seed
+                continue
+            rows.append(row)
+            print(line_of(row), flush=True)
     for task in tasks:
         print(summary_of([row for row in rows if row.task == task]))
     if options.json is not None:

@@ -35,6 +35,8 @@ def verify_protocol(
 ) -> int:
     """Replay the certificates of a protocol's starts: the baseline must solve each again.
 
+    Those that do not hold are named as they are found, on standard error, and at the end.
+
     Args:
       version: Of the protocol.
       tasks: Only these; by default all.
@@ -60,6 +62,7 @@ def verify_protocol(
         for done, (start, outcome) in enumerate(verify(version, known, certified, jobs, assets), 1):
             if isinstance(outcome, str):
                 broken.append((start, outcome))
+                progress.say(f"{start[0]} {start[1]}: {outcome}")
             progress.update(done, len(certified), f"{done - len(broken)} hold")
     console = output.standard_output()
     for (task, number), reason in sorted(broken):

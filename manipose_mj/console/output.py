@@ -102,6 +102,10 @@ class Progress:
             text = f"{count} {self._unit}, {note}, {seconds:.0f} s"
             self._console.print(text)
 
+    def say(self, line: str) -> None:
+        """A line of its own, above the bar where there is one."""
+        self._console.print(line, soft_wrap=True, markup=False, highlight=False)
+
 
 def fail_line(message: str) -> None:
     """One line on standard error about something wrong."""
