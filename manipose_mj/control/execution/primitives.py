@@ -133,6 +133,8 @@ class Primitives:
             yield from let_go(self._executor, planner, name)
             raise StageFailure("grasp", f"the gripper closed past {name}")
         self._executor.hold(name)
+        if name in estimate.parts:
+            estimate = self._executor.observe()  # a handle is where the hand has it
         self._held = _Held(name, pick, pose_in_hand(estimate, name))
 
     def move_to(self, planner: MotionPlanner, step: Step) -> Actions:
@@ -291,7 +293,10 @@ class Primitives:
             beyond = _BEYOND_SHUT if opening <= part.joint.range[0] else _BEYOND_OPEN
             aim += np.sign(opening - part.opening) * beyond[part.joint.kind]
         in_vain = self._in_vain.get(name, ())
-        push = push_part(planner, estimate, part, aim, in_vain, in_stages=self.in_stages)
+        stages = (
+            self.in_stages or part.goes_on
+        )  # where nobody knows how far it goes, any way will do
+        push = push_part(planner, estimate, part, aim, in_vain, in_stages=stages)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)
         yield from self._executor.follow(push.way.targets(self._executor.timestep))

@@ -17,7 +17,7 @@ from manipose_mj.control.furniture.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
-from manipose_mj.control.furniture.opening_search import Hidden, found_opening, misfit
+from manipose_mj.control.furniture.opening_search import Hidden, as_held, found_opening, misfit
 from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
 from manipose_mj.control.furniture.pulled_out import as_it_moved, pulled_out
 from manipose_mj.control.furniture.scene_cloud import (
@@ -219,9 +219,13 @@ class EstimatedFurniture:
             self._moved[self._held.name] = True
         self._held = None
         if part is not None and self.model is not None:
-            back = invert(part.motion(part.opening)) @ invert(self.model.pose)
-            start = transform(back, tcp_pose[None, :3, 3])[0]
-            self._held = _Held(part.name, start, np.zeros(3))
+            place = transform(invert(self.model.pose), tcp_pose[None, :3, 3])
+            part = as_held(part, place[0])
+            start = transform(invert(part.motion(part.opening)), place)[0]
+            self.model, self._held = (
+                self.model.with_part(part),
+                _Held(part.name, start, np.zeros(3)),
+            )
 
     def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Find out how far parts are open now, through the cameras that see their fronts: images take time."""

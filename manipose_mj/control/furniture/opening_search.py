@@ -37,6 +37,8 @@ _MOST, _FEWEST_LOOKS = 300, 20
 # before the front, they are looked for [m]; from which share of the longest lever on; how many there have to be, and which
 # share of what is seen there.
 _NEARLY_SHUT, _MARGIN, _FAR_FROM_HINGE, _TELLING, _MOST_SEEN = 0.2, 0.02, 0.5, 100, 0.5
+# How far the middle of a hand is from the bar that it holds, at most [m].
+_IN_HAND = 0.03
 
 
 Hidden = Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, "n"]]
@@ -101,6 +103,32 @@ def found_opening(
         tilt = _tilt(part, points)
         best = best if tilt is None else tilt
     return 0.0 if best < _SHUT[kind] else float(best)
+
+
+def as_held(part: PartModel, place: Float[np.ndarray, "3"]) -> PartModel:
+    """The part as far open as the hand holds its handle: as it was seen, if the handle is in the hand then.
+
+    Args:
+      part: With its handle.
+      place: Of the tool center point, object frame [m].
+    """
+    handle = part.part.handle
+    if handle is None:
+        return part
+    half = np.array([handle.extents[0] / 2, 0.0, 0.0])
+    bar = transform(handle.pose, np.array([-half, half]))
+
+    def away(opening: float) -> float:
+        one, other = transform(part.motion(opening), bar)
+        along = other - one
+        share = np.clip((place - one) @ along / max(along @ along, 1e-12), 0.0, 1.0)
+        return float(np.linalg.norm(one + share * along - place))
+
+    if away(part.opening) < _IN_HAND:
+        return part
+    joint = part.part.joint
+    best = min(np.arange(0.0, joint.range[1], _STEPS[joint.kind][1]).tolist(), key=away)
+    return part.at(best) if away(best) < _IN_HAND else part
 
 
 def misfit(

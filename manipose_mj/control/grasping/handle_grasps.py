@@ -27,6 +27,9 @@ from manipose_mj.poses import compose, invert, rotation_about
 _TILT_STEP = radians(15)
 _GRIP_TILT = radians(75)
 _PUSH_TILT = radians(90)
+# Of fingers that hold a bar askew, against the arm's joints. A thin bar turns in them; a wider one [m] pries them open, and
+# they slide off: they tilt less.
+_ASKEW_PRICE, _TURNING_WIDTH, _WIDE_TILT = 0.6, 0.02, radians(15)
 _X = np.array([1.0, 0.0, 0.0])
 _MIN_GRIP = 0.012  # of the bar beyond the middle of the fingers [m]
 _MAX_WIDTH = MAX_OPENING - 0.004  # of what the gripper takes [m]
@@ -64,12 +67,15 @@ class Grip:
     """Fingers around a handle, about whose bar the hand may tilt.
 
     Attributes: bar: `T_part_bar`, its X along the bar and its Y outwards; upright: `T_bar_tcp` without a
-    tilt; opening: of the gripper, closed on the bar [m].
+    tilt; opening: of the gripper, closed on the bar [m]; askew_price: of each pose with another tilt than that at
+    which it is held straight, against arm joints, both [rad].
     """
 
     bar: Float[np.ndarray, "4 4"]
     upright: Float[np.ndarray, "4 4"]
     opening: float
+    askew_price: float = 0.0
+    straight: float = 0.0
 
     @property
     def opening_before(self) -> float:
@@ -79,6 +85,8 @@ class Grip:
     @property
     def tilts(self) -> Float[np.ndarray, "n"]:
         """Of the hand about the bar [rad]."""
+        if self.askew_price:
+            return self.straight + _grid(_WIDE_TILT)
         return _grid(_GRIP_TILT)
 
     def tcp_poses(self, tilts: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k 4 4"]:
@@ -97,7 +105,13 @@ def grip_now(
     # Without a tilt the hand looks along -Y.
     tilt = float(np.arctan2(-now[2, 2], -now[1, 2]))
     back = compose(rotation_about(_X, -tilt), np.zeros(3))
-    return Grip(part.handle.pose @ turn, back @ now, opening), tilt
+    bar = part.handle.pose @ turn
+    return Grip(bar, back @ now, opening, _askew_price(part), straight=tilt), tilt
+
+
+def _askew_price(part: PartEstimate) -> float:
+    along, _, across = part.handle.extents
+    return _ASKEW_PRICE if along > _MAX_WIDTH and across > _TURNING_WIDTH else 0.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +124,10 @@ class Push:
       axis: About which the hand tilts `(3,)`, a unit vector in the surface.
       flat: Whether the fingers lie side by side along the axis.
       sign: Which of two half turns about the approach.
+      opening: Of the gripper [m].
+      opening_before: Of the gripper as it comes [m].
+      askew_price: Of each pose with a tilt, against arm joints, both [rad].
+      straight: Tilt at which it is not askew [rad].
     """
 
     point: Float[np.ndarray, "3"]
@@ -119,6 +137,8 @@ class Push:
     sign: float = 1.0
     opening: float = 0.0
     opening_before: float = 0.0
+    askew_price: float = 0.0
+    straight: float = 0.0
 
     @property
     def tilts(self) -> Float[np.ndarray, "n"]:
@@ -178,7 +198,7 @@ def grips(part: PartEstimate, kind: GripKind = "usual") -> Iterator[Grip]:
                 approach = np.array([0.0, -1.0, 0.0])
                 rotation = np.stack([x, np.cross(approach, x), approach], axis=1)
                 upright = compose(rotation, slide * _X - back * approach)
-                yield Grip(part.handle.pose @ turn, upright, float(width))
+                yield Grip(part.handle.pose @ turn, upright, float(width), _askew_price(part))
 
 
 def _slides(free: float, back: float, kind: GripKind) -> list[float]:

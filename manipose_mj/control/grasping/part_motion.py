@@ -44,12 +44,19 @@ _TIMING = Timing(speed=0.35, linear_speed=0.12)
 class Hold(Protocol):
     """A way to touch a part.
 
-    Attributes: tilts: of the hand that it allows [rad]; opening: of the gripper meanwhile [m]; opening_before: of
+    Attributes: tilts: of the hand that it allows [rad]; straight: tilt at which it is not askew [rad]; askew_price: of
+    each pose with another, against arm joints, both [rad]; opening: of the gripper meanwhile [m]; opening_before: of
     the gripper as it comes [m].
     """
 
     @property
     def tilts(self) -> Float[np.ndarray, "n"]: ...
+
+    @property
+    def straight(self) -> float: ...
+
+    @property
+    def askew_price(self) -> float: ...
 
     @property
     def opening(self) -> float: ...
@@ -124,10 +131,11 @@ def find_way(
     layers = _layers(planner, part, hold, openings, near, clearance)
     if start is not None and start_tilt is not None:
         layers[0] = _Layer(start[None], np.array([start_tilt]))
+    askew = [hold.askew_price * np.abs(layer.tilts - hold.straight) for layer in layers]
     broken: set[tuple[int, int, int]] = set()
     kept: list[int] = []
     for _ in range(_MAX_CHAINS):
-        chain = _shortest(layers, near, broken)
+        chain = _shortest(layers, near, broken, askew)
         if len(chain) <= len(kept):
             break
         way = _refined(planner, part, hold, layers, chain, openings, clearance)
@@ -214,7 +222,10 @@ def _distinct(joints: Float[np.ndarray, "s 7"], solved: np.ndarray) -> list[int]
 
 
 def _shortest(
-    layers: list[_Layer], near: Float[np.ndarray, "7"], broken: set[tuple[int, int, int]]
+    layers: list[_Layer],
+    near: Float[np.ndarray, "7"],
+    broken: set[tuple[int, int, int]],
+    askew: list[np.ndarray],
 ) -> list[int]:
     """Index into every layer of the cheapest chain that reaches farthest.
 
@@ -222,10 +233,11 @@ def _shortest(
       layers: Of solutions.
       near: A configuration near which to start [rad].
       broken: Layers, with an index into each and into the next, that nothing leads between.
+      askew: What the tilts of each layer cost, `(m,)` each.
     """
     if not len(layers[0].joints):
         return []
-    cost = 0.3 * np.abs(layers[0].joints - near).max(axis=1)
+    cost = 0.3 * np.abs(layers[0].joints - near).max(axis=1) + askew[0]
     before: list[Int[np.ndarray, "m"]] = []
     for k, (one, two) in enumerate(zip(layers, layers[1:], strict=False)):
         if not len(two.joints):
@@ -238,7 +250,7 @@ def _shortest(
         for layer, i, j in broken:
             if layer == k:
                 step[j, i] = np.inf
-        total = step + cost[None]
+        total = step + cost[None] + askew[k + 1][:, None]
         if not np.isfinite(total).any():
             break
         before.append(total.argmin(axis=1))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -75,10 +76,12 @@ def grip_handle(
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
     ways: list[PartWay] = []
-    for kind in _FIRM_KINDS if in_stages or following else _KINDS:
+    kinds = _FIRM_KINDS if in_stages or following else _KINDS
+    wide = any(hold.askew_price for hold in grips(part))
+    for askew, kind in product((False, True) if wide else (False,), kinds):
         led = (
             find_way(planner, part, hold, opening, near=estimate.joints)
-            for hold in grips(part, kind)
+            for hold in (_turning(hold) if askew else hold for hold in grips(part, kind))
         )
         held = (
             way
@@ -107,6 +110,11 @@ def grip_handle(
         "plan",
         f"no grip of {part.name}'s handle works: {len(stages)} could move it, none can be approached",
     )
+
+
+def _turning(hold: Grip) -> Grip:
+    """The same, where the hand may turn about a bar that pries its fingers open: if nothing else will do."""
+    return replace(hold, askew_price=0.0)
 
 
 def _closes_on(planner: MotionPlanner, part: PartEstimate, way: PartWay) -> bool:
@@ -173,16 +181,20 @@ def way_in_hand(
     may be to the part and to what is around it.
     """
     hold, tilt = grip_now(part, planner.tcp_pose(estimate.joints), estimate.opening)
-    return find_way(
-        planner,
-        part,
-        hold,
-        opening,
-        near=estimate.joints,
-        start=estimate.joints,
-        start_tilt=tilt,
-        clearance=clearance,
-    )
+    for each in (hold, _turning(hold)) if hold.askew_price else (hold,):
+        way = find_way(
+            planner,
+            part,
+            each,
+            opening,
+            near=estimate.joints,
+            start=estimate.joints,
+            start_tilt=tilt,
+            clearance=clearance,
+        )
+        if way is not None:
+            return way
+    return None
 
 
 def ending_free(

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.opened_part import seen_open
-from manipose_mj.control.furniture.opening_search import found_opening, misfit
+from manipose_mj.control.furniture.opening_search import as_held, found_opening, misfit
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
@@ -197,3 +197,18 @@ def test_a_part_found_on_an_open_door_is_gone_unless_it_is_asked_for():
     model = FurnitureModel(np.eye(4), np.zeros((0, 2, 3)), (door, on), "oven")
     assert model.without_fronts_over(door, ()).parts == (door,)
     assert model.without_fronts_over(door, ("knob",)).parts == (door, on)
+
+
+@pytest.mark.parametrize(("kind", "opening"), [("slide", 0.15), ("hinge", 0.5)])
+def test_a_part_whose_handle_the_hand_holds_is_as_open_as_the_hand_has_it(kind, opening):
+    part = a_part(kind)
+    handle = part.part.handle
+    assert handle is not None
+    place = transform(part.motion(opening), handle.origin[None])[0] + [0.0, 0.004, 0.0]
+    assert as_held(part, place).opening == pytest.approx(opening, abs=0.02)
+    # Fingers may be anywhere along a bar: what was seen stands.
+    seen = part.at(opening)
+    beside = transform(part.motion(opening), handle.origin[None] + [[0.0, 0.05, 0.0]])[0]
+    assert as_held(seen, beside).opening == opening
+    # A hand that is nowhere near it tells nothing.
+    assert as_held(part, place + [0.0, 0.0, 0.4]).opening == 0.0

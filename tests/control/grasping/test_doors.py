@@ -113,6 +113,19 @@ def test_knobs_are_held_deeper_in_stages_than_usual(scene):
     assert not list(grips(part, "deep"))
 
 
+def test_a_wide_bar_is_not_held_askew(scene):
+    _, _, part = scene
+    along, depth, _ = part.handle.extents
+    wide = replace(part, handle=replace(part.handle, extents=np.array([along, depth, 0.032])))
+    goal = part.joint.range[0] + 0.4 * np.ptp(part.joint.range)
+    ways = [way for hold in grips(wide) if (way := _way(scene, hold, goal, wide)) is not None]
+    assert ways and all(np.abs(way.tilts).max() < 0.3 for way in ways)
+    # Fingers turn about a thin bar, and about a knob.
+    knob = replace(part, handle=replace(part.handle, extents=np.array([0.03, depth, 0.03])))
+    for other in (part, knob):
+        assert all(np.abs(hold.tilts).max() > 1.0 for hold in grips(other))
+
+
 def test_a_knob_that_is_followed_is_held_such_that_the_hand_turns_with_the_door():
     environment = load(
         "articulated", "open_cabinet_door", seed=2, objects="cabinet_009", obs_mode="state"
