@@ -15,7 +15,7 @@ _SURE_END, _SAME_END = 0.85, 0.03
 # A door that goes along with a push to within so much of its end, near the end of the usual range or beyond, is not at its
 # own; one that stays behind by so much is [rad]. How much further it is taken to go meanwhile, and any door at most [rad].
 _ALONG, _BEHIND, _NEAR_END = 0.08, 0.12, 0.9
-_FURTHER, _WIDEST = 1.0, np.pi
+_FURTHER, _WIDEST = 0.7, np.pi
 
 
 class Stops:

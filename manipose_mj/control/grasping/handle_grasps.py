@@ -38,6 +38,8 @@ _CROSSWISE = compose(rotation_about(np.array([0.0, 1.0, 0.0]), -np.pi / 2), np.z
 # Of a hand farther out: at least [m], and of the depth of a bar and of a knob.
 _BACK, _BACK_SHARE, _KNOB_SHARE = 0.004, 0.25, 0.5
 _DEEP_SHARES = (0.125, 0.25, 0.375)  # of the depth of a knob
+# The same of a wide bar, whose middle may be estimated too far out: the hand goes beyond it.
+_WIDE_SHARES = (-0.375, -0.2)
 _BEFORE = 0.002  # of a hand that holds a bar by its fingertips, from the bar's front [m]
 _SLIDES = (0.0, 0.025, -0.025)  # along the bar, from its middle [m]
 _ASIDE = (0.4, -0.4, 0.8, -0.8)  # the same, as shares of what is free on either side
@@ -175,7 +177,7 @@ def grips(part: PartEstimate, kind: GripKind = "usual") -> Iterator[Grip]:
       part: Has the handle.
       kind: `"fingertips"`: only by the front of the bar, which leaves the most room to what is behind it. `"deep"`:
         only around the widest place of a knob, or as near to it as there is room; a round one slips out of
-        fingers on its front half. No bar is so held. `"aside"`: only away from the middle of a long bar.
+        fingers on its front half; and behind the middle of a wide bar. No thin bar is so held. `"aside"`: only away from the middle of a long bar.
     """
     along, height, across = part.handle.extents
     knob = along < _MAX_WIDTH
@@ -187,7 +189,8 @@ def grips(part: PartEstimate, kind: GripKind = "usual") -> Iterator[Grip]:
     if kind == "fingertips":
         backs = (height / 2 + _BEFORE,)
     elif kind == "deep":
-        backs = tuple(share * height for share in _DEEP_SHARES) if knob else ()
+        wide = _WIDE_SHARES if _askew_price(part) else ()
+        backs = tuple(share * height for share in (_DEEP_SHARES if knob else wide))
     elif kind == "aside":
         backs = (0.0,)
     for (turn, width, length), back in product(ways, backs):
