@@ -91,9 +91,8 @@ class EstimatedFurniture:
         self._stops, self._swings = Stops(), Swings()
         # Hinges that an open panel or a long arc of the hand has shown.
         self._sure: dict[str, Joint] = {}
-        self._before: dict[
-            str, float
-        ] = {}  # openings of parts that were pushed, or that the hand slipped off, and not looked at since
+        # Openings of parts that were pushed, or that the hand slipped off, and not looked at since.
+        self._before: dict[str, float] = {}
 
     def reset(self, key: Any) -> None:
         """Look at the furniture of the episode.
@@ -222,10 +221,8 @@ class EstimatedFurniture:
             place = transform(invert(self.model.pose), tcp_pose[None, :3, 3])
             part = as_held(part, place[0])
             start = transform(invert(part.motion(part.opening)), place)[0]
-            self.model, self._held = (
-                self.model.with_part(part),
-                _Held(part.name, start, np.zeros(3)),
-            )
+            self.model = self.model.with_part(part)
+            self._held = _Held(part.name, start, np.zeros(3))
 
     def follow(self, tcp_pose: Float[np.ndarray, "4 4"]) -> None:
         """Find out how far parts are open now, through the cameras that see their fronts: images take time."""
