@@ -293,9 +293,8 @@ class Primitives:
             beyond = _BEYOND_SHUT if opening <= part.joint.range[0] else _BEYOND_OPEN
             aim += np.sign(opening - part.opening) * beyond[part.joint.kind]
         in_vain = self._in_vain.get(name, ())
-        stages = (
-            self.in_stages or part.goes_on
-        )  # where nobody knows how far it goes, any way will do
+        # Where nobody knows how far it goes, any way will do.
+        stages = self.in_stages or part.goes_on
         push = push_part(planner, estimate, part, aim, in_vain, in_stages=stages)
         yield from self._executor.follow(push.free_path)
         yield from self._executor.follow(push.approach)

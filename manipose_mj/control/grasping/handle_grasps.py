@@ -69,8 +69,8 @@ class Grip:
     """Fingers around a handle, about whose bar the hand may tilt.
 
     Attributes: bar: `T_part_bar`, its X along the bar and its Y outwards; upright: `T_bar_tcp` without a
-    tilt; opening: of the gripper, closed on the bar [m]; askew_price: of each pose with another tilt than that at
-    which it is held straight, against arm joints, both [rad].
+    tilt; opening: of the gripper, closed on the bar [m]; askew_price: of each pose that is not straight, against arm
+    joints, both [rad], 0 where the hand may turn about the bar; straight: tilt at which fingers hold it so [rad].
     """
 
     bar: Float[np.ndarray, "4 4"]
@@ -97,10 +97,8 @@ class Grip:
         return self.bar @ compose(turns, np.zeros((len(turns), 3))) @ self.upright
 
 
-def grip_now(
-    part: PartEstimate, tcp_pose: Float[np.ndarray, "4 4"], opening: float
-) -> tuple[Grip, float]:
-    """How the hand holds the handle now, and its tilt [rad]."""
+def grip_now(part: PartEstimate, tcp_pose: Float[np.ndarray, "4 4"], opening: float) -> Grip:
+    """How the hand holds the handle now: that is straight, whatever its tilt."""
     along = np.abs((part.handle_pose[:3, :3].T @ tcp_pose[:3, 0])[[0, 2]])
     turn = _CROSSWISE if along[1] > along[0] else np.eye(4)
     now = invert(part.handle_pose @ turn) @ tcp_pose
@@ -108,7 +106,7 @@ def grip_now(
     tilt = float(np.arctan2(-now[2, 2], -now[1, 2]))
     back = compose(rotation_about(_X, -tilt), np.zeros(3))
     bar = part.handle.pose @ turn
-    return Grip(bar, back @ now, opening, _askew_price(part), straight=tilt), tilt
+    return Grip(bar, back @ now, opening, _askew_price(part), straight=tilt)
 
 
 def _askew_price(part: PartEstimate) -> float:
@@ -177,7 +175,8 @@ def grips(part: PartEstimate, kind: GripKind = "usual") -> Iterator[Grip]:
       part: Has the handle.
       kind: `"fingertips"`: only by the front of the bar, which leaves the most room to what is behind it. `"deep"`:
         only around the widest place of a knob, or as near to it as there is room; a round one slips out of
-        fingers on its front half; and behind the middle of a wide bar. No thin bar is so held. `"aside"`: only away from the middle of a long bar.
+        fingers on its front half; and behind the middle of a wide bar. No thin bar is so held. `"aside"`: only away
+        from the middle of a long bar.
     """
     along, height, across = part.handle.extents
     knob = along < _MAX_WIDTH

@@ -108,7 +108,6 @@ def find_way(
     *,
     near: Float[np.ndarray, "7"],
     start: Float[np.ndarray, "7"] | None = None,
-    start_tilt: float | None = None,
     clearance: Clearance = CONTACT,
 ) -> PartWay | None:
     """The shortest way from the part's opening towards another, as far as the arm can.
@@ -119,8 +118,7 @@ def find_way(
       hold: How.
       opening: Where to [m or rad].
       near: A configuration near which to start [rad].
-      start: The configuration at the start, where the hand is there already [rad].
-      start_tilt: And its tilt then [rad].
+      start: The configuration at the start, where the hand is there already, straight [rad].
       clearance: How near the hand may be to the part and to what is around it meanwhile.
 
     Returns:
@@ -129,8 +127,8 @@ def find_way(
     count = max(2, round(abs(opening - part.opening) / _LAYER[part.joint.kind]) + 1)
     openings = np.linspace(part.opening, opening, count)
     layers = _layers(planner, part, hold, openings, near, clearance)
-    if start is not None and start_tilt is not None:
-        layers[0] = _Layer(start[None], np.array([start_tilt]))
+    if start is not None:
+        layers[0] = _Layer(start[None], np.array([hold.straight]))
     askew = [hold.askew_price * np.abs(layer.tilts - hold.straight) for layer in layers]
     broken: set[tuple[int, int, int]] = set()
     kept: list[int] = []

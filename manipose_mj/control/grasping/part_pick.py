@@ -180,7 +180,7 @@ def way_in_hand(
     It may end short of `opening` [m or rad]; None if there is none at all. `clearance` is how near the hand
     may be to the part and to what is around it.
     """
-    hold, tilt = grip_now(part, planner.tcp_pose(estimate.joints), estimate.opening)
+    hold = grip_now(part, planner.tcp_pose(estimate.joints), estimate.opening)
     for each in (hold, _turning(hold)) if hold.askew_price else (hold,):
         way = find_way(
             planner,
@@ -189,7 +189,6 @@ def way_in_hand(
             opening,
             near=estimate.joints,
             start=estimate.joints,
-            start_tilt=tilt,
             clearance=clearance,
         )
         if way is not None:
