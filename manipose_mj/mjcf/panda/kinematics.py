@@ -113,18 +113,24 @@ def link_poses(joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "7 4 4"]:
     """
     pose = np.eye(4)
     poses = []
-    for (a, d, alpha), theta in zip(DH, joints, strict=True):
-        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        pose = pose @ np.array(
-            [
-                [ct, -st, 0.0, a],
-                [st * ca, ct * ca, -sa, -d * sa],
-                [st * sa, ct * sa, ca, d * ca],
-                [0.0, 0.0, 0.0, 1.0],
-            ]
-        )
+    for index, theta in enumerate(joints):
+        pose = pose @ link_step(index, theta)
         poses.append(pose)
     return np.stack(poses)
+
+
+def link_step(index: int, theta: float) -> Float[np.ndarray, "4 4"]:
+    """Pose of a link in the frame of the one before it, the first being 0, for its joint's angle [rad]."""
+    a, d, alpha = DH[index]
+    ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    return np.array(
+        [
+            [ct, -st, 0.0, a],
+            [st * ca, ct * ca, -sa, -d * sa],
+            [st * sa, ct * sa, ca, d * ca],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def flange_pose(joints: Float[np.ndarray, "7"]) -> Float[np.ndarray, "4 4"]:

@@ -1,10 +1,14 @@
-"""Whether the hand finds room at a shelf: a quick check of annotated grasps, without an arm."""
+"""Whether the hand finds room at a shelf: a quick check of annotated grasps, without solving for the arm."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.assets.gripper import ParallelJaw
+from manipose_mj.mjcf.panda.forearm import LINK_RADII, links_behind
 from manipose_mj.mjcf.shelf import ShelfConfig
 from manipose_mj.poses import invert, transform
 
@@ -14,11 +18,13 @@ _HAND = ((0.035, 0.110), (-0.115, -0.035))
 _WRIST = ((0.060, 0.060), (-0.230, -0.100))
 _SLICES = 5  # of each, where its edges are looked at
 _BACK_OFF = 0.08  # the approach begins so far back [m]
+_FLOOR = 0.003  # the open hand is so far from what the object rests on, as grasps are annotated [m]
 # From the shoulder to the wrist, whose centre is so far behind the tcp [m]: the arm's reach, less what
 # it needs to move.
 _WRIST_BEHIND = 0.21
 _SHOULDER = np.array([0.0, 0.0, 0.333])
 _REACH = (0.25, 0.74)
+_POINT = np.zeros(1)
 
 
 def grasps_with_room(
@@ -29,6 +35,8 @@ def grasps_with_room(
 ) -> Bool[np.ndarray, "n"]:
     """Which grasps the hand can come to, as far as the shelf and the arm's length are concerned.
 
+    So far as it takes room behind the hand the arm is looked at too: forearm and wrist, one way of them at least.
+
     Args:
       tcp_poses: `T_world_tcp`.
       shelf_pose: `T_world_shelf`.
@@ -38,24 +46,45 @@ def grasps_with_room(
     wrists = tcp_poses[:, :3, 3] - _WRIST_BEHIND * tcp_poses[:, :3, 2]
     reach = np.linalg.norm(wrists - _SHOULDER, axis=1)
     room = (reach > _REACH[0]) & (reach < _REACH[1]) & (wrists[:, 2] > 0.05)
-    near = invert(shelf_pose) @ tcp_poses[room]
-    points = transform(near, np.broadcast_to(_HAND_POINTS, (len(near), *_HAND_POINTS.shape)))
-    room[room] = ~_in_wood(points, config, level).any(axis=1)
+    from_shelf = invert(shelf_pose)
+    near = from_shelf @ tcp_poses[room]
+    hands = transform(near, np.broadcast_to(_HAND_POINTS, (len(near), *_HAND_POINTS.shape)))
+    room[room] = ~_in_wood(hands, config, level).any(axis=1)
+    for back in (0.0, _BACK_OFF):
+        at = tcp_poses[room]
+        at[:, :3, 3] -= back * at[:, :3, 2]
+        owner, links = links_behind(at)
+        free = ~_in_wood(transform(from_shelf, links), config, level, LINK_RADII).any(axis=1)
+        room[room] = np.bincount(owner[free], minlength=len(at)) > 0
     return room
 
 
+def above_floor(
+    tcp_poses: Float[np.ndarray, "n 4 4"], widths: Float[np.ndarray, "n"], floor: float
+) -> Bool[np.ndarray, "n"]:
+    """Whether the open hand, at grasps `T_world_tcp` of these widths [m] and back, is over a floor at this height [m]."""
+    gripper = ParallelJaw()
+    boxes = gripper.boxes(gripper.opening(widths))
+    low, high = boxes[:, :, None, 0], boxes[:, :, None, 1]
+    corners = transform(tcp_poses[:, None], low + _CORNERS * (high - low))[..., 2]
+    back = np.minimum(0.0, -_BACK_OFF * tcp_poses[:, 2, 2])
+    return corners.min(axis=(1, 2)) + back >= floor + _FLOOR
+
+
 def _in_wood(
-    points: Float[np.ndarray, "n p 3"], config: ShelfConfig, level: int | None
+    points: Float[np.ndarray, "n p 3"],
+    config: ShelfConfig,
+    level: int | None,
+    radii: Float[np.ndarray, "#p"] = _POINT,
 ) -> Bool[np.ndarray, "n p"]:
-    """Whether points of the shelf's frame are in it, but for the free space of one level."""
+    """Whether balls in the shelf's frame are in it, or between its front and back but not in the one level."""
     x, y, z = np.moveaxis(points, -1, 0)
-    inside = (x > 0) & (np.abs(y) < config.width / 2) & (z < config.boards[-1])
+    between = (x > -radii) & (x < config.depth + radii)
     if level is None:
-        return inside & (x < config.depth)
+        return between & (np.abs(y) < config.width / 2 + radii) & (z < config.boards[-1] + radii)
     floor, height = config.levels[level]
-    free = (x < config.depth) & (np.abs(y) < config.width / 2 - config.thickness)
-    free &= (z > floor) & (z < floor + height)
-    return inside & ~free
+    free = np.abs(y) < config.width / 2 - config.thickness - radii
+    return between & ~(free & (z > floor + radii) & (z < floor + height - radii))
 
 
 def _slices(half: tuple[float, float], ends: tuple[float, float]) -> Float[np.ndarray, "p 3"]:
@@ -64,5 +93,6 @@ def _slices(half: tuple[float, float], ends: tuple[float, float]) -> Float[np.nd
     return np.stack(np.meshgrid(xs, ys, zs), -1).reshape(-1, 3)
 
 
+_CORNERS = np.array(list(itertools.product((0, 1), repeat=3)), float)
 _AT_GRASP = np.concatenate([_slices(*_HAND), _slices(*_WRIST)])
 _HAND_POINTS = np.concatenate([_AT_GRASP, _AT_GRASP - [0.0, 0.0, _BACK_OFF]])

@@ -12,7 +12,7 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import compose, invert
 from manipose_mj.tasks.core.start import NoStartError
-from manipose_mj.tasks.single_object.grasp_room import grasps_with_room
+from manipose_mj.tasks.single_object.grasp_room import above_floor, grasps_with_room
 from manipose_mj.tasks.single_object.shelf_places import ShelfPlaces, Zone
 
 ZONES: tuple[Zone, ...] = ("table", "by", "under", "in")
@@ -23,10 +23,9 @@ _TURNS = 8  # of an axis of symmetry that are looked at
 
 @dataclass(frozen=True)
 class _Stand:
-    """How an object stands at a shelf: zone, index of its stable pose, `T_world_object`."""
+    """How an object stands at a shelf: zone, `T_world_object`."""
 
     zone: Zone
-    stable: int
     pose: Float[np.ndarray, "4 4"]
 
 
@@ -71,9 +70,9 @@ class ShelfSampler:
                 continue
             if np.linalg.norm((start_pose - goal_pose)[:3, 3]) < self.min_distance:
                 continue
-            serving = self._with_room(asset, _Stand(start_zone, start, start_pose), shelf_pose)
+            serving = self._with_room(asset, _Stand(start_zone, start_pose), shelf_pose)
             if serving.sum() > most:
-                at_goal = _Stand(goal_zone, goal, goal_pose)
+                at_goal = _Stand(goal_zone, goal_pose)
                 serving &= self._with_room_at_goal(asset, at_goal, shelf_pose)
             if serving.sum() > most:
                 best, most = (start_pose, goal_pose), int(serving.sum())
@@ -91,10 +90,11 @@ class ShelfSampler:
     ) -> Bool[np.ndarray, "n"]:
         """Which of the asset's grasps have room there."""
         assert asset.grasps is not None
-        mask = asset.grasps.clear[:, stand.stable].copy()
-        tcp_poses = stand.pose @ asset.grasps.poses[mask]
         level = self.places.level(stand.zone)
-        mask[mask] = grasps_with_room(tcp_poses, shelf_pose, self.places.shelf, level)
+        floor = 0.0 if level is None else self.places.shelf.levels[level][0]
+        tcp_poses = stand.pose @ asset.grasps.poses
+        mask = above_floor(tcp_poses, asset.grasps.widths, floor)
+        mask[mask] = grasps_with_room(tcp_poses[mask], shelf_pose, self.places.shelf, level)
         return mask
 
     def _with_room_at_goal(

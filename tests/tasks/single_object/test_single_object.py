@@ -13,6 +13,7 @@ from manipose_mj.assets import catalogue
 from manipose_mj.assets.asset import Asset, GraspSet, StablePose
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+from manipose_mj.mjcf.shelf import ShelfConfig
 from manipose_mj.mjcf.sleep import sleep_disabled
 from manipose_mj.poses import compose, invert, pose_error, rotation_about
 from manipose_mj.tasks.goals import OrientationGoal
@@ -23,7 +24,7 @@ from manipose_mj.tasks.scene.resting import (
     require_graspable,
     usable_poses,
 )
-from manipose_mj.tasks.single_object.grasp_room import grasps_with_room
+from manipose_mj.tasks.single_object.grasp_room import above_floor, grasps_with_room
 from manipose_mj.tasks.single_object.orientation import orientation_pairs
 from manipose_mj.tasks.single_object.position import IntoShelfConfig, PositionConfig
 from manipose_mj.tasks.single_object.reorient import tipped_poses
@@ -282,6 +283,32 @@ def test_a_hand_has_room_in_front_of_a_level_and_none_through_a_board():
     assert not grasps_with_room(wall, shelf_pose, PLACES.shelf, None).any()
     far = compose(level, np.array([1.4, 0.0, 0.15]))[None]
     assert not grasps_with_room(far, shelf_pose, PLACES.shelf, 0).any()
+
+
+@pytest.mark.parametrize(("board", "room"), [(0.41, False), (0.44, True)])
+def test_a_hand_from_above_needs_room_for_the_arm_behind_it(board, room):
+    shelf_pose = compose(np.eye(3), np.array([0.55, 0.0, 0.0]))
+    pose = compose(np.diag([1.0, -1.0, -1.0]), np.array([0.65, 0.0, 0.02]))
+    # Link 6 ends 296 mm behind the tcp; the hand backs off by 80 mm.
+    shelf = ShelfConfig(boards=(board,))
+    assert bool(grasps_with_room(pose[None], shelf_pose, shelf, 0)[0]) is room
+
+
+def test_a_hand_has_no_room_through_a_wall():
+    shelf_pose = compose(np.eye(3), np.array([0.55, 0.0, 0.0]))
+    lying = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    # Its outer side would be beyond the wall.
+    at = [compose(lying, np.array([0.6, y, 0.15])) for y in (0.0, 0.27)]
+    assert grasps_with_room(np.stack(at), shelf_pose, PLACES.shelf, 0).tolist() == [True, False]
+
+
+def test_the_open_hand_is_over_the_floor_or_it_is_not():
+    level = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    at = np.array([0.6, 0.0, 0.03])
+    poses = np.stack([compose(np.diag([1.0, -1.0, -1.0]), at), compose(level, at)])
+    assert above_floor(poses, np.full(2, 0.02), 0.0).tolist() == [True, False]
+    assert above_floor(poses, np.full(2, 0.02), -0.05).tolist() == [True, True]
+    assert not above_floor(poses, np.full(2, 0.02), 0.02).any()
 
 
 def test_zones_that_the_shelf_lacks_are_refused(mug):
