@@ -16,12 +16,16 @@ _STRAIGHT = 0.87  # cosine between a door's hinge and an axis of the front, at l
 # Of the handle of a flap: how far from the middle at most, across, and at least, upright, of the panel's half.
 _ACROSS, _UPRIGHT = 0.3, 0.5
 _WIDE = 0.5  # of the panel's width, from which on a level bar is a flap's
+_WIDEST = 0.85  # of doors about upright hinges: two of them take up what is wider [m]
+_TALL = 1.5  # times as high as wide: no flap, unless its bar is wide
 _AT_EDGE = 0.25  # how far from an edge of the panel an upright hinge may be, of the panel's width
 _INWARDS = 0.02  # how much a handle goes into the body at most as its door opens [m/rad]
 _CORNER = 0.6  # across: beyond it no flap has its handle
 # Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
 # of the handle, and a gap that ends it [m], wider than the shadow of a handle; points that tell.
 _FACE, _STRIP, _GAP, _TELLING = 0.04, 0.10, 0.15, 60
+# Strips of a front this wide [m] are the panel's where points fill that share of them at least.
+_CELL, _SHARE = 0.02, 0.25
 
 
 def is_straight(axis: Float[np.ndarray, "3"]) -> bool:
@@ -53,6 +57,7 @@ def can_be_a_door(
         return False
     if abs(axis[1]) > _STRAIGHT:
         return abs(float(_away(handle, panel)[1])) < _CORNER
+    panel = _one_of_two(handle, panel)
     width = float(np.ptp(panel[:, 1]))
     at_edge = float(np.abs(panel[:, 1] - origin[1]).min()) < _AT_EDGE * width
     return abs(float(axis[2])) > _STRAIGHT and at_edge
@@ -63,6 +68,7 @@ def whole_front(
     front: float,
     handle: Float[np.ndarray, "4 4"],
     panel: Float[np.ndarray, "2 3"],
+    off: float = _FACE,
 ) -> Float[np.ndarray, "2 3"]:
     """As much of a panel as is in one piece with what is behind the handle: beyond a gap there is another front.
 
@@ -71,18 +77,46 @@ def whole_front(
       front: Of the panel, along X [m].
       handle: `T_object_handle`, shut.
       panel: Low and high corner, object frame [m].
+      off: How far points of the front are from its plane [m]: it may be curved.
     """
-    found, local = panel.copy(), points - handle[:3, 3]
-    on = (np.abs(points[:, 0] - front) < _FACE) & (points >= panel[0])[:, 1:].all(axis=1)
+    found, own = panel.copy(), handle[:3, 3]
+    on = (np.abs(points[:, 0] - front) < off) & (points >= panel[0])[:, 1:].all(axis=1)
     on &= (points <= panel[1])[:, 1:].all(axis=1)
-    for axis in (1, 2):
-        along = local[on & (np.abs(local[:, 3 - axis]) < _STRIP), axis]
-        if len(along) < _TELLING:
-            continue
-        low, high = np.add(run_around(along, _GAP), handle[axis, 3])
-        if low < handle[axis, 3] < high:
-            found[:, axis] = max(panel[0, axis], low), min(panel[1, axis], high)
+    face = points[on, 1:] - own[1:]
+    # Upright as it is near the handle; then across, as far as it is as high there; then upright, as far as it is as wide.
+    near = face[np.abs(face[:, 0]) < _STRIP]
+    _end(found, own, panel, 1, near)
+    _end(found, own, panel, 0, _filled(face, found - own, 0))
+    _end(found, own, panel, 1, _filled(face, found - own, 1))
     return found
+
+
+def _end(
+    found: Float[np.ndarray, "2 3"],
+    own: Float[np.ndarray, "3"],
+    panel: Float[np.ndarray, "2 3"],
+    axis: int,
+    face: Float[np.ndarray, "n 2"],
+) -> None:
+    """End a panel across (0) or upright (1) where points of its face do."""
+    if len(face) < _TELLING:
+        return
+    low, high = np.add(run_around(face[:, axis], _GAP), own[1 + axis])
+    if low < own[1 + axis] < high:
+        found[:, 1 + axis] = max(panel[0, 1 + axis], low), min(panel[1, 1 + axis], high)
+
+
+def _filled(
+    face: Float[np.ndarray, "n 2"], panel: Float[np.ndarray, "2 3"], axis: int
+) -> Float[np.ndarray, "m 2"]:
+    """Points of a front in strips, one after the other along an axis, of which they fill a share within the panel."""
+    other = 1 - axis
+    face = face[(face[:, other] >= panel[0, 1 + other]) & (face[:, other] <= panel[1, 1 + other])]
+    at = np.floor(face / _CELL).astype(int)
+    strips, filled = np.unique(np.unique(at, axis=0)[:, axis], return_counts=True)
+    return face[
+        np.isin(at[:, axis], strips[filled * _CELL >= _SHARE * np.ptp(panel[:, 1 + other])])
+    ]
 
 
 def likely_hinge(
@@ -101,7 +135,11 @@ def likely_hinge(
     along, away = np.abs(handle[:3, 0]), _away(handle, panel)
     middle, half = panel.mean(axis=0), np.ptp(panel, axis=0) / 2
     wide = length > _WIDE * 2 * half[1]
-    level = along[1] > along[2] and abs(away[1]) < _ACROSS and (wide or abs(away[2]) > _UPRIGHT)
+    edge = abs(away[2]) > _UPRIGHT and half[2] < _TALL * half[1]
+    level = along[1] > along[2] and abs(away[1]) < _ACROSS and (wide or edge)
+    if not level:
+        panel = _one_of_two(handle, panel)
+        away, middle, half = _away(handle, panel), panel.mean(axis=0), np.ptp(panel, axis=0) / 2
     across = 2 if level else 1
     side = -1.0 if away[across] > (-_UPRIGHT if level else 0.0) else 1.0
     origin = np.array([panel[1, 0], middle[1], middle[2]])
@@ -109,6 +147,18 @@ def likely_hinge(
     axis = np.zeros(3)
     axis[1 if level else 2] = -side if level else side
     return origin, axis
+
+
+def _one_of_two(
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """The half of a panel that has the handle, where it is too wide for one upright door."""
+    middle = panel[:, 1].mean()
+    if np.ptp(panel[:, 1]) < _WIDEST:
+        return panel
+    half = panel.copy()
+    half[1 if handle[1, 3] < middle else 0, 1] = middle
+    return half
 
 
 def _away(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, usual_swing
+from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, usual_swing, whole_front
 from manipose_mj.control.furniture.object_frame import object_pose
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
@@ -66,7 +66,8 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
         for part in tuple(shut):
             shut += part.column(shut, points, normals)
         shut += missed(shut, front, points)
-        for part in shut:
+    for part in shut:
+        if category not in WITH_KNOBS or part.is_bar:
             part.turn_as_doors_do(shut, bounds, points, normals)
     if any(part.opening == 0.0 for part in shut):
         for part in shut:
@@ -210,6 +211,8 @@ def _within_face(
     if on.sum() < _FACE_LEAST:
         return panel
     low, high = ends_of(points[on])
+    whole = whole_front(points, float(panel[1, 0]), part.handle, panel, _FACE)
+    low, high = np.maximum(low, whole[0]), np.minimum(high, whole[1])
     found = panel.copy()
     own, half = part.handle[:3, 3], part.half
     for axis in (1, 2):

@@ -11,7 +11,12 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
+from manipose_mj.control.furniture.door_hinge import (
+    can_be_a_door,
+    is_level,
+    likely_hinge,
+    whole_front,
+)
 from manipose_mj.control.furniture.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
@@ -26,6 +31,10 @@ _TELLING = 150  # points of a panel that tell how far it swung, at least
 _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 # How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
+# How far beyond an edge of its panel, or within it, a hinge is that is taken to be at it, from and to [m].
+_OFF_EDGE, _INSIDE = 0.04, 0.15
+_FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
+_LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
 _USUAL_HALF, _BESIDE = 0.05, 0.005
 # How near a handle what stands out of the front is the handle, and how far from where it was sensed it may be [m]; the
@@ -97,6 +106,16 @@ class ShutPart:
         if slender:
             self.handle[:3, :3] = max(slender, key=lambda each: each[0])[1]
 
+    @property
+    def is_bar(self) -> bool:
+        """Whether its handle shows as a long bar: no knob."""
+        return self.measured and float(self.half.max()) > _LONG_BAR
+
+    @property
+    def shows(self) -> bool:
+        """Whether more than the network tells of it: its handle stands out, or it is open."""
+        return self.measured or self.opening > 0.0 or self.sensed.certain
+
     def take(self, bump: Bump, points: Float[np.ndarray, "n 3"]) -> None:
         """Have for a handle what stands out of the front there."""
         across, upright = bump.size
@@ -108,7 +127,7 @@ class ShutPart:
             self.handle[:3, 3] = label.origin
         lengths = np.abs(label.rotation) @ label.extents if seen else np.array([0.0, *bump.size])
         self.half = lengths / 2 + _BESIDE
-        self.base, self.measured = bump.base, True
+        self.base, self.measured = bump.base, seen
 
     def twin(
         self,
@@ -129,7 +148,7 @@ class ShutPart:
         ):
             return None
         twin = ShutPart(replace(self.sensed, confidence=self.sensed.confidence * _TWIN), self.pose)
-        twin.handle[:3, 3], twin.half = place, self.half
+        twin.handle[:3, 3], twin.half, twin.measured = place, self.half, True
         # As in a mirror between the two handles.
         twin.origin[1] = self.handle[1, 3] + place[1] - self.origin[1]
         twin.axis = self.axis * [-1.0, 1.0, -1.0]
@@ -160,6 +179,7 @@ class ShutPart:
                 drawer = ShutPart(replace(self.sensed, confidence=confidence), self.pose)
                 drawer.origin = self.origin + place - self.handle[:3, 3]
                 drawer.handle, drawer.half = compose(self.handle[:3, :3], place), self.half
+                drawer.measured = True
                 found.append(drawer)
         return found
 
@@ -176,19 +196,32 @@ class ShutPart:
             return
         shut = [other for other in others if other.opening == 0.0 or other.kind == "slide"]
         between = between_neighbours(self, shut, bounds)
+        front = panel_place(points, normals, self) if self.opening == 0.0 else None
+        facing, flat = points[normals[:, 0] > FACING], between
+        if front is not None:
+            flat = whole_front(facing, front, self.handle, between, _FLAT)
+            between = whole_front(facing, front, self.handle, between)
         possible = can_be_a_door(self.origin, self.axis, self.handle, between)
         askew = not possible or np.abs(self.axis).max() < _SNAP
         if askew and self.opening == 0.0 and any(map(self._is_in_a_row_with, others)):
             self.kind, self.axis = "slide", np.array([1.0, 0.0, 0.0])
             self.origin = self.handle[:3, 3].copy()
         elif not possible:
-            front = panel_place(points, normals, self) if self.opening == 0.0 else None
-            if front is not None:
-                facing = points[normals[:, 0] > FACING]
-                between = whole_front(facing, front, self.handle, between)
             self.handle = invert(self.back) @ self.handle
             self.opening, self.back = 0.0, np.eye(4)
-            self.origin, self.axis = likely_hinge(self.handle, between)
+            length = 2 * float(self.half.max()) if self.measured else 0.0
+            self.origin, self.axis = likely_hinge(self.handle, between, length)
+        elif front is not None and np.abs(self.axis).max() >= _SNAP:
+            self._turn_about_edge(flat if is_level(self.axis) else between)
+
+    def _turn_about_edge(self, panel: Float[np.ndarray, "2 3"]) -> None:
+        """Have the hinge at the edge of the panel that it is beyond, or not far within."""
+        across = 2 if is_level(self.axis) else 1
+        side = float(np.sign(self.origin[across] - self.handle[across, 3]))
+        edge = float(panel[1 if side > 0 else 0, across])
+        beyond = side * (self.origin[across] - edge)
+        if abs(beyond) > _OFF_EDGE and beyond > -_INSIDE:
+            self.origin[across] = edge
 
     def _is_in_a_row_with(self, other: ShutPart) -> bool:
         """Whether a sure drawer has a handle of the same size at the same height, and both show."""
@@ -337,7 +370,7 @@ def between_neighbours(
     low, high = bounds[0].copy(), bounds[1].copy()
     own, half = part.handle[:3, 3], part.half
     for other in others:
-        if other is part or other.sensed.confidence < 0.15:
+        if other is part or other.sensed.confidence < 0.15 or not other.shows:
             continue
         away = other.handle[:3, 3] - own
         axis = 2 if abs(away[2]) > abs(away[1]) else 1

@@ -73,3 +73,40 @@ def test_beyond_a_gap_there_is_another_front(curved):
     found = whole_front(seen, 0.2, handle(0.05, 0.5), between)
     np.testing.assert_allclose(found, [[0.0, -0.3, 0.1], [0.2, 0.1, 0.6]], atol=0.011)
     np.testing.assert_allclose(whole_front(seen[:40], 0.2, handle(0.05, 0.5), between), between)
+
+
+def test_a_front_ends_where_only_the_edge_of_a_table_top_goes_on():
+    y, z = (grid.ravel() for grid in np.mgrid[-0.6:0.6:0.01, 0.0:0.7:0.01])
+    door = (y > 0.0) & (y < 0.16)
+    seen = np.column_stack([np.full_like(y, 0.2), y, z])[door | (z > 0.66)]
+    between = np.array([[0.0, -0.6, 0.0], [0.2, 0.6, 0.7]])
+    found = whole_front(seen, 0.2, handle(0.05, 0.6), between)
+    np.testing.assert_allclose(found[:, 1], [0.0, 0.16], atol=0.021)
+    np.testing.assert_allclose(found[:, 2], [0.0, 0.7], atol=0.021)
+
+
+def test_a_flap_ends_above_a_plinth_that_a_curved_front_would_take_in():
+    y, z = (grid.ravel() for grid in np.mgrid[-0.3:0.3:0.01, 0.0:0.6:0.01])
+    seen = np.column_stack([np.where(z < 0.12, 0.18, 0.2), y, z])
+    between = np.array([[0.0, -0.3, 0.0], [0.2, 0.3, 0.6]])
+    at = handle(0.0, 0.5, ACROSS_FRONT)
+    assert whole_front(seen, 0.2, at, between)[0, 2] == pytest.approx(0.0)
+    assert whole_front(seen, 0.2, at, between, 0.012)[0, 2] == pytest.approx(0.12, abs=0.011)
+
+
+def test_what_is_far_higher_than_wide_is_no_flap_but_for_a_wide_bar():
+    tall = np.array([[0.18, -0.1, 0.0], [0.20, 0.1, 0.6]])
+    knob = handle(-0.02, 0.55, ACROSS_FRONT)
+    assert abs(likely_hinge(knob, tall)[1][2]) == 1.0
+    assert abs(likely_hinge(knob, tall, length=0.15)[1][1]) == 1.0
+
+
+@pytest.mark.parametrize(("y", "hinge"), [(-0.45, 0.0), (-0.05, -0.5), (0.05, 0.5)])
+def test_what_is_too_wide_for_one_door_is_two(y, hinge):
+    wide = np.array([[0.18, -0.5, 0.1], [0.20, 0.5, 0.6]])
+    origin, axis = likely_hinge(handle(y, 0.4), wide)
+    assert abs(axis[2]) == 1.0
+    assert origin[1] == pytest.approx(hinge)
+    assert can_be_a_door(origin, axis, handle(y, 0.4), wide)
+    far = np.array([0.2, -hinge or 0.5, 0.3])
+    assert not can_be_a_door(far, axis, handle(-0.45, 0.4), wide)

@@ -269,3 +269,37 @@ def test_what_has_a_drawers_handle_beside_it_slides_too_unless_its_hinge_is_a_do
     )
     model = fit_furniture(cloud([*body(), *knobs]), SensedFurniture(X, (drawer, beside)), "cabinet")
     assert sum(part.hinged for part in model.parts) == hinged
+
+
+def surest(seen: SceneCloud, parts: tuple[SensedPart, ...], category: str) -> PartModel:
+    """What is made of sensed parts, the surest."""
+    model = fit_furniture(seen, SensedFurniture(X, parts), category)
+    return max(model.parts, key=lambda part: part.confidence)
+
+
+def test_where_nothing_stands_out_nobody_has_a_neighbour():
+    real = sensed("hinge", [FRONT + 0.03, -0.2, 0.3])
+    phantom = sensed("hinge", [FRONT + 0.03, 0.0, 0.3], confidence=0.3)
+    found = surest(cloud([*body(), knob(-0.2)]), (real, phantom), "cabinet")
+    assert found.part.joint.origin[1] == pytest.approx(HALF, abs=0.03)
+    assert found.panel[1, 1] == pytest.approx(HALF, abs=0.03)
+    two = cloud([*body(), knob(-0.2), knob(0.1)])
+    beside = replace(phantom, handle=compose(UP_FRONT, np.array([FRONT + 0.03, 0.1, 0.3])))
+    found = surest(two, (real, beside), "cabinet")
+    assert found.panel[1, 1] == pytest.approx(-0.05, abs=0.03)
+
+
+def test_an_ovens_long_bar_is_no_knob():
+    wide = rectangle(np.array([FRONT + 0.03, -0.2, 0.42]), 0.4 * Y, 0.012 * Z, X)
+    part = sensed("hinge", [FRONT + 0.03, 0.0, 0.426], handle=level(0.426))
+    found = surest(cloud([*body(), wide]), (part,), "oven")
+    np.testing.assert_allclose(found.part.joint.axis, Y, atol=1e-6)
+    assert found.part.joint.origin[2] == pytest.approx(-HEIGHT / 2, abs=0.03)
+
+
+@pytest.mark.parametrize(("thought", "is_at"), [(0.45, HALF), (0.22, HALF), (0.31, 0.31)])
+def test_a_hinge_is_at_the_edge_of_its_front_but_for_small_errors(thought, is_at):
+    origin = np.array([FRONT, thought, 0.2])
+    part = sensed("hinge", [FRONT + 0.03, -0.2, 0.3], origin=origin, axis=Z)
+    found = surest(cloud([*body(), knob(-0.2)]), (part,), "cabinet")
+    assert found.part.joint.origin[1] == pytest.approx(is_at, abs=0.02)
