@@ -303,3 +303,19 @@ def test_a_hinge_is_at_the_edge_of_its_front_but_for_small_errors(thought, is_at
     part = sensed("hinge", [FRONT + 0.03, -0.2, 0.3], origin=origin, axis=Z)
     found = surest(cloud([*body(), knob(-0.2)]), (part,), "cabinet")
     assert found.part.joint.origin[1] == pytest.approx(is_at, abs=0.02)
+
+
+@pytest.mark.parametrize("across", [True, False])
+def test_what_bulges_around_where_a_bar_was_sensed_is_none(across):
+    rotation = ACROSS_FRONT if across else UP_FRONT
+    at = compose(rotation, np.array([FRONT + 0.03, 0.0, 0.25]))
+    bulge = rectangle(np.array([FRONT + 0.02, -0.25, 0.05]), 0.5 * Y, 0.4 * Z, X)[0]
+    assert not handle_label(bulge, at, FRONT)[1]
+    way = Y if across else Z
+    lying = rectangle(
+        at[:3, 3] - 0.2 * way - 0.006 * (Y + Z - way), 0.4 * way, 0.012 * (Y + Z - way), X
+    )[0]
+    assert handle_label(lying, at, FRONT)[1]
+    # Two bars side by side are two.
+    pair = np.concatenate([lying, lying + 0.045 * (Y + Z - way)])
+    assert handle_label(pair, at, FRONT)[1]

@@ -22,6 +22,8 @@ _THIN_BAR, _USUAL_DEPTH = 0.010, 0.012  # how deep bars are at least, and are ke
 _STRIP = 0.002  # of a bar, along it [m]
 _STRAY = 0.15  # of the points of a usual strip, up to which others are stray
 _RARE = 0.08  # share of a bar's points that counts as noise, on either side
+# Where points are beside a bar, from its axis [m]; from which share of the bar's own density on it is none.
+_BESIDE, _AS_DENSE = (0.030, 0.055), 0.5
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -52,9 +54,9 @@ def _measured(
     local = transform(invert(handle), points)
     panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
     standing = local[:, 1] > min(panel + _STANDING, -0.006)
-    on = standing & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH) & (local[:, 1] < 0.03)
-    on &= np.abs(local[:, 0]) < 0.35
-    if on.sum() < 12:
+    near = standing & (local[:, 1] < 0.03) & (np.abs(local[:, 0]) < 0.35)
+    on = near & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH)
+    if on.sum() < 12 or _goes_on(local[near], local[on]):
         usual = np.array([0.10, 0.012, 0.012])
         return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
     along = run_around(_often(local[on, 0]), 0.025)
@@ -81,6 +83,18 @@ def _measured(
         extents = np.array([side, depth, side])
         rotation = ACROSS_FRONT if handle[0, 1] > _FACES else rotation
     return PoseLabel(middle, rotation, "handle", extents, _TURNS), True
+
+
+def _goes_on(near: Float[np.ndarray, "n 3"], on: Float[np.ndarray, "m 3"]) -> bool:
+    """Whether what stands out of a panel does so on both sides of a bar too: it is a bulge, or another front."""
+    low, high = run_around(on[:, 0], _BESIDE[1] - _BESIDE[0])
+    near = near[(near[:, 0] >= low) & (near[:, 0] <= high)]
+    dense = len(on) / (4 * _HANDLE_REACH)
+    sides = [
+        ((sign * near[:, 2] > _BESIDE[0]) & (sign * near[:, 2] < _BESIDE[1])).sum()
+        for sign in (-1, 1)
+    ]
+    return min(sides) / (_BESIDE[1] - _BESIDE[0]) > _AS_DENSE * dense
 
 
 def _often(along: Float[np.ndarray, "n"]) -> Float[np.ndarray, "m"]:
