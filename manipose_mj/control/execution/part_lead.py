@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.control.execution.executor import Action, Actions, Executor
 from manipose_mj.control.grasping.part_motion import PartWay
-from manipose_mj.control.grasping.part_pick import ending_free, way_in_hand
+from manipose_mj.control.grasping.part_pick import HELD, ending_free, way_in_hand
 from manipose_mj.control.motion.batch_ik import forward
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.scene.collision_query import CONTACT
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
 
-# A hand that holds a handle is where the estimate may have the handle itself.
-_HELD = replace(CONTACT, arm=-0.004, target=-0.02)
 _EVERY = 4  # control steps between looks at where the hand is
 _BESIDE = 0.004  # how far the hand may be beside its path before the joint is corrected [m]
 # Up and down with a drawer, which slides level: the pull lifts the hand by some millimetres.
@@ -114,8 +111,8 @@ def _way(
         beyond = opening - _BEYOND_SHUT[part.joint.kind]
     if abs(beyond - part.opening) < 0.01:
         return None
-    way = way_in_hand(planner, estimate, part, beyond, _HELD)
-    return None if way is None else ending_free(planner, part, way, _HELD)
+    way = way_in_hand(planner, estimate, part, beyond, HELD)
+    return None if way is None else ending_free(planner, part, way, HELD)
 
 
 def _follow(

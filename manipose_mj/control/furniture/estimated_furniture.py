@@ -48,7 +48,7 @@ _LEAST_POINTS = 1500  # of furniture that is looked at
 _LONG_ARC = 0.5  # of a hinge, from which on the hand knows it better than clouds do [rad]
 # Of the usual range of a door, from which on nobody knows how far it opens: where no stop was felt, its share; where one
 # was, how far beyond [rad].
-_NEAR_END, _BEYOND = 0.9, 0.05
+_NEAR_END, _BEYOND = 0.9, 0.02
 _NEAR = 0.35  # of a part's handle: the hand may have moved the part [m]
 
 

@@ -32,6 +32,8 @@ _MAX_TRIES = 12  # ways for which an approach is looked for
 # is room for [m].
 _WIDER = (0.030, 0.020, 0.010)
 _EVERY = 4  # poses of a path, of which one is looked at
+# A hand that holds a handle is where the estimate may have the handle itself.
+HELD = replace(CONTACT, arm=-0.004, target=-0.02)
 # How a handle is taken, the first that will do; in stages what slipped out of a usual grip is to be held better.
 _KINDS: tuple[GripKind, ...] = ("usual", "fingertips")
 _FIRM_KINDS: tuple[GripKind, ...] = ("deep", *_KINDS, "aside")
@@ -75,7 +77,13 @@ def grip_handle(
     if opening is None:
         low, high = part.joint.range
         opening = high if part.opening - low < high - part.opening else low
+
+    def best_first(way: PartWay) -> tuple[float, bool, float]:
+        share = share_of(way, part, opening)
+        return -round(share, 1), following and not _turns_along(way, part), _turned(way)
+
     ways: list[PartWay] = []
+    shut_in: list[PartWay] = []
     kinds = _FIRM_KINDS if in_stages or following else _KINDS
     wide = any(hold.askew_price for hold in grips(part))
     for askew, kind in product((False, True) if wide else (False,), kinds):
@@ -83,25 +91,24 @@ def grip_handle(
             find_way(planner, part, hold, opening, near=estimate.joints)
             for hold in (_turning(hold) if askew else hold for hold in grips(part, kind))
         )
-        held = (
+        held = [
             way
             for way in led
             if way is not None and (kind != "aside" or _closes_on(planner, part, way))
-        )
-        free = (ending_free(planner, part, way) for way in held)
+        ]
+        free = [ending_free(planner, part, way) for way in held]
+        shut_in += [way for way, end in zip(held, free, strict=True) if end is None]
         found = [way for way in free if way is not None]
-        found.sort(
-            key=lambda way: (
-                -round(share_of(way, part, opening), 1),
-                following and not _turns_along(way, part),
-                _turned(way),
-            )
-        )
+        found.sort(key=best_first)
         ways += found
         far = [way for way in found if anywhere or leads_enough(way, part, opening)]
         grip = _approached(planner, estimate, part, far, wider=following)
         if grip is not None:
             return grip
+    if following and not ways:
+        # What is estimated may be off by as much as is missing for the hand to get off.
+        freed = (ending_free(planner, part, way, HELD) for way in shut_in)
+        ways = sorted((way for way in freed if way is not None), key=best_first)
     stages = [way for way in ways if is_a_stage(way, part)]
     grip = _approached(planner, estimate, part, stages, wider=following)
     if grip is not None:

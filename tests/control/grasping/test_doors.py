@@ -19,6 +19,7 @@ from manipose_mj.control.grasping.handle_grasps import (
 )
 from manipose_mj.control.grasping.part_motion import PartWay, find_way
 from manipose_mj.control.grasping.part_pick import (
+    HELD,
     _closes_on,
     grip_handle,
     is_a_stage,
@@ -166,6 +167,18 @@ def test_a_long_bar_may_be_held_away_from_its_middle_where_there_is_any_of_it(sc
     grip = grip_handle(planner, estimate, part, part.joint.range[1], in_stages=True)
     tcp = invert(part.handle_pose) @ planner.tcp_pose(grip.approach[-1])
     assert min(abs(abs(tcp[0, 3]) - abs(slide)) for slide in along) < 2e-3
+
+
+def test_where_an_estimate_lets_no_hand_get_off_it_may_be_the_estimate(scene, monkeypatch):
+    planner, estimate, part = scene
+    ending = part_pick.ending_free
+    monkeypatch.setattr(
+        part_pick, "ending_free", lambda *way: ending(*way) if way[3:] == (HELD,) else None
+    )
+    goal = part.joint.range[1]
+    with pytest.raises(StageFailure, match="none can be approached"):
+        grip_handle(planner, estimate, part, goal)
+    assert len(grip_handle(planner, estimate, part, goal, following=True).approach)
 
 
 def _before(hold, part: PartEstimate, front: np.ndarray) -> float:
