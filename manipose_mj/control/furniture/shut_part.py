@@ -31,8 +31,8 @@ _TELLING = 150  # points of a panel that tell how far it swung, at least
 _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 # How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
-# How far beyond an edge of its panel, or within it, a hinge is that is taken to be at it, from and to [m].
-_OFF_EDGE, _INSIDE = 0.04, 0.15
+# How far a hinge is off an edge of its panel that is taken to be at it: at least, and within it at most [m].
+_OFF_EDGE, _INSIDE, _INSIDE_FLAP = 0.04, 0.10, 0.20
 _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
@@ -220,7 +220,9 @@ class ShutPart:
         side = float(np.sign(self.origin[across] - self.handle[across, 3]))
         edge = float(panel[1 if side > 0 else 0, across])
         beyond = side * (self.origin[across] - edge)
-        if abs(beyond) > _OFF_EDGE and beyond > -_INSIDE:
+        # Beside an upright hinge there may be another door, whose handle was not found.
+        inside = _INSIDE_FLAP if across == 2 else _INSIDE
+        if abs(beyond) > _OFF_EDGE and beyond > -inside:
             self.origin[across] = edge
 
     def _is_in_a_row_with(self, other: ShutPart) -> bool:
