@@ -57,7 +57,7 @@ def can_be_a_door(
         return False
     if abs(axis[1]) > _STRAIGHT:
         width, height = np.ptp(panel[:, 1:], axis=0)
-        return abs(float(_away(handle, panel)[1])) < _CORNER and height < _TALL * width
+        return abs(float(_away(handle, panel)[1])) < _CORNER and bool(height < _TALL * width)
     panel = _one_of_two(handle, panel)
     width = float(np.ptp(panel[:, 1]))
     at_edge = float(np.abs(panel[:, 1] - origin[1]).min()) < _AT_EDGE * width

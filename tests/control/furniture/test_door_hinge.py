@@ -98,6 +98,7 @@ def test_what_is_far_higher_than_wide_is_no_flap_but_for_a_wide_bar():
     tall = np.array([[0.18, -0.1, 0.0], [0.20, 0.1, 0.6]])
     knob = handle(-0.02, 0.55, ACROSS_FRONT)
     assert abs(likely_hinge(knob, tall)[1][2]) == 1.0
+    assert not can_be_a_door(np.array([0.2, 0.0, 0.0]), Y, knob, tall)
     assert abs(likely_hinge(knob, tall, length=0.15)[1][1]) == 1.0
 
 
