@@ -3,7 +3,7 @@
 A pose of the TCP leaves the arm one freedom. With the last joint at some turn the wrist's centre is known, and the
 forearm lies in a plane: the last but one joint is where the elbow comes as far from the shoulder as the upper arm is
 long. The joints before have no say but in their limits, which are not looked at. (He and Liu, "Analytical inverse
-kinematics for Franka Emika Panda", ICMRE 2021, solve it all from there.)
+kinematics for Franka Emika Panda", ICCMA 2021, solve it all from there.)
 """
 
 from __future__ import annotations

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.assets.asset import StablePose
 from manipose_mj.assets.gripper import ParallelJaw
+from manipose_mj.grasp_sampling.grasp_choice import clear_of_plane
 from manipose_mj.mjcf.panda.forearm import LINK_RADII, links_behind
 from manipose_mj.mjcf.shelf import ShelfConfig
 from manipose_mj.poses import invert, transform
@@ -18,7 +18,6 @@ _HAND = ((0.035, 0.110), (-0.115, -0.035))
 _WRIST = ((0.060, 0.060), (-0.230, -0.100))
 _SLICES = 5  # of each, where its edges are looked at
 _BACK_OFF = 0.08  # the approach begins so far back [m]
-_FLOOR = 0.003  # the open hand is so far from what the object rests on, as grasps are annotated [m]
 # From the shoulder to the wrist, whose centre is so far behind the tcp [m]: the arm's reach, less what
 # it needs to move.
 _WRIST_BEHIND = 0.21
@@ -63,12 +62,8 @@ def above_floor(
     tcp_poses: Float[np.ndarray, "n 4 4"], widths: Float[np.ndarray, "n"], floor: float
 ) -> Bool[np.ndarray, "n"]:
     """Whether the open hand, at grasps `T_world_tcp` of these widths [m] and back, is over a floor at this height [m]."""
-    gripper = ParallelJaw()
-    boxes = gripper.boxes(gripper.opening(widths))
-    low, high = boxes[:, :, None, 0], boxes[:, :, None, 1]
-    corners = transform(tcp_poses[:, None], low + _CORNERS * (high - low))[..., 2]
-    back = np.minimum(0.0, -_BACK_OFF * tcp_poses[:, 2, 2])
-    return corners.min(axis=(1, 2)) + back >= floor + _FLOOR
+    lying = StablePose(np.eye(3), -floor, 1.0)
+    return clear_of_plane(tcp_poses, widths, (lying,), ParallelJaw())[:, 0]
 
 
 def _in_wood(
@@ -93,6 +88,5 @@ def _slices(half: tuple[float, float], ends: tuple[float, float]) -> Float[np.nd
     return np.stack(np.meshgrid(xs, ys, zs), -1).reshape(-1, 3)
 
 
-_CORNERS = np.array(list(itertools.product((0, 1), repeat=3)), float)
 _AT_GRASP = np.concatenate([_slices(*_HAND), _slices(*_WRIST)])
 _HAND_POINTS = np.concatenate([_AT_GRASP, _AT_GRASP - [0.0, 0.0, _BACK_OFF]])
