@@ -25,6 +25,7 @@ _UNSURE_LETTING_GO = (0.04, 0.024)  # the same of an object whose shape is estim
 # The same of what lies over the table's edge: it sinks between the fingers.
 _FROM_BELOW_LETTING_GO = (MAX_OPENING, 0.055, 0.04, 0.025)
 _GIVING_WAY = (0.006, 0.012)
+_LEAST_RETREAT = 0.03  # from what was taken where there is little room [m]
 _LOST = 0.01  # what is further from the hand has fallen from it [m]
 _OWN_PART = -0.02  # how deep a hand may be in the estimate of the part that it lets go [m]
 _SETTLE = 0.25  # after letting go [s]
@@ -108,6 +109,9 @@ def retreat_from(
         line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
         if line is not None:
             return line
+    line = retreat(planner, estimate, released.geoms, touched, (_LEAST_RETREAT,), near)
+    if line is not None:
+        return line
     near_by = CollisionQuery(replace(CONTACT, arm=-np.inf, target=_LOST), target=released.geoms)
     if name in estimate.objects and not planner.collides(estimate.joints, near_by):
         return estimate.joints[None]  # there is nothing to back off from

@@ -11,6 +11,7 @@ from manipose_mj.control.execution.executor import Actions, Executor
 from manipose_mj.control.execution.letting_go import let_go, retreat_from
 from manipose_mj.control.execution.lifting import retraction_of
 from manipose_mj.control.execution.part_lead import lead_part
+from manipose_mj.control.execution.placing import place_held, placed_again
 from manipose_mj.control.execution.slip import closed_past, exceeds, pose_in_hand, slip_of
 from manipose_mj.control.grasping.handle_grasps import Push
 from manipose_mj.control.grasping.object_push import leave_pushed, push_object
@@ -22,20 +23,13 @@ from manipose_mj.control.grasping.part_pick import (
 )
 from manipose_mj.control.grasping.part_push import off_surface, push_part, reached_by
 from manipose_mj.control.grasping.pick import ObjectPick, PartPick, pick_object, pick_part
-from manipose_mj.control.grasping.retraction import (
-    Place,
-    find_place,
-    lowering,
-    transport_path,
-)
+from manipose_mj.control.grasping.retraction import lowering, transport_path
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.plan_articulated import AJAR
-from manipose_mj.control.scene.cavity_mouth import way_out
 from manipose_mj.control.scene.collision_query import GRAZING, CollisionQuery
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
 from manipose_mj.failures import StageFailure
-from manipose_mj.poses import invert
 
 # Past this the object in the hand is not where the grasp put it.
 _LOST_DISTANCE, _LOST_ANGLE = 0.04, 0.6
@@ -80,6 +74,8 @@ class Primitives:
         # `T_tcp_label` of grasps that did not hold or led nowhere, and of those objects were last released from.
         self._slipped: dict[str, list[Float[np.ndarray, "4 4"]]] = {}
         self._released: dict[str, Float[np.ndarray, "4 4"]] = {}
+        # Joint targets by which what is held was lifted, while it is still where they end.
+        self._lifted: Float[np.ndarray, "t 7"] | None = None
         self._in_vain: dict[str, list[Push]] = {}  # pushes that hardly moved a part
         self.in_stages = False
         # Of parts: where the hand last led each by its handle from, and where to [m or rad].
@@ -150,7 +146,7 @@ class Primitives:
 
     def release(self, planner: MotionPlanner, name: str) -> Actions:
         """Let go and back off along the approach."""
-        held, self._held = self._held, None
+        held, self._held, self._lifted = self._held, None, None
         ungripped, self._ungripped = self._ungripped, None
         if held is None and name == ungripped:
             return
@@ -166,6 +162,18 @@ class Primitives:
         for name, pose in self._released.items():
             self._slipped.setdefault(name, []).append(pose)
         self._released.clear()
+
+    def put_back(self) -> Actions:
+        """Set what was only lifted down where it was taken, and take it another way next time.
+
+        Raises:
+          StageFailure: It has been carried on, or nothing is held.
+        """
+        if self._held is None or self._lifted is None:
+            raise StageFailure("plan", "nothing was only lifted")
+        self._slipped.setdefault(self._held.name, []).append(self._held.pose_tcp)
+        way, self._lifted = self._lifted[::-1], None
+        yield from self._executor.follow(way)
 
     def lower(self, planner: MotionPlanner, name: str) -> Actions:
         """Take what is held straight down until it nearly meets something."""
@@ -187,26 +195,29 @@ class Primitives:
         name = step.subject
         planner = planner.touching_support(pick.support_allowance)
         estimate, planner = self._observe(planner)
-        yield from self._executor.follow(retraction_of(planner, estimate, name))
+        lifted = retraction_of(planner, estimate, name)
+        yield from self._executor.follow(lifted)
+        self._lifted = lifted if self._lifted is None else np.concatenate([self._lifted, lifted])
         # Things turn a little in the hand when their weight comes on it: measure, then plan.
         estimate, planner = self._observe(planner)
         pose_tcp = self._check_held(estimate, name)
-        place = _place(planner, estimate, step, pose_tcp, pick.goal)
+        place = place_held(planner, estimate, step, pose_tcp, pick.goal)
         if place is None and self._held is not None:
             # What hangs down in the hand turns back as it meets the table.
-            place = _place(planner, estimate, step, self._held.pose_tcp, pick.goal)
+            place = place_held(planner, estimate, step, self._held.pose_tcp, pick.goal)
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
         attached = estimate.in_hand(name)
         free = transport_path(planner, estimate.joints, place.above, attached, pressed=True)
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
+        self._lifted = None
         yield from self._executor.follow(free)
         estimate, planner = self._observe(planner)
         now = self._check_held(estimate, name)
         slip = slip_of(estimate, name, now, pose_tcp)
         if exceeds(slip, _SLIP):
-            again = _placed_again(planner, estimate, step, now)
+            again = placed_again(planner, estimate, step, now)
             if again is not None:
                 free, place = again
                 yield from self._executor.follow(free)
@@ -368,32 +379,3 @@ def _can_be_pushed_on(part: PartEstimate, opening: float | None) -> bool:
     """Whether it is a door, wide enough open to be pushed open further from inside."""
     ajar = part.joint.kind == "hinge" and part.opening > part.joint.range[0] + AJAR
     return ajar and opening is not None and opening > part.opening
-
-
-def _place(
-    planner: MotionPlanner,
-    estimate: SceneEstimate,
-    step: Step,
-    pose_tcp: Float[np.ndarray, "4 4"],
-    near: Float[np.ndarray, "7"],
-) -> Place | None:
-    """How to set down what is held, as if it were held at `T_tcp_label`, near a configuration [rad]."""
-    obj = estimate.objects[step.subject]
-    way = way_out(estimate, step.poses[0][:3, 3])
-    attached = obj.held_at(pose_tcp @ invert(obj.label.pose))
-    return find_place(planner, pose_tcp, step.poses, obj.label.symmetry, attached, near, way)
-
-
-def _placed_again(
-    planner: MotionPlanner,
-    estimate: SceneEstimate,
-    step: Step,
-    pose_tcp: Float[np.ndarray, "4 4"],
-) -> tuple[Float[np.ndarray, "t 7"], Place] | None:
-    """A short path and a descent for the object as it lies in the hand now."""
-    place = _place(planner, estimate, step, pose_tcp, estimate.joints)
-    if place is None:
-        return None
-    query = estimate.in_hand(step.subject).query()
-    free = planner.free_path(estimate.joints, place.above, query)
-    return None if free is None else (free, place)

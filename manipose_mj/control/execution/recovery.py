@@ -24,7 +24,7 @@ def let_go_safely(
     supported: bool = False,
     among_others: bool = False,
 ) -> Actions:
-    """Set down what is held on the table, as it lies in the hand; let go of a handle where it is.
+    """Set down what is held on the table, as it lies in the hand, or where it was; let go of a handle where it is.
 
     Args:
       primitives: What holds it.
@@ -45,9 +45,10 @@ def let_go_safely(
         try:
             yield from primitives.move_to(planner, Step("move_to", name, poses=poses))
         except StageFailure:
-            if not among_others:
-                raise
-            yield from _set_down_in_clutter(primitives, planner, name)
+            if among_others:
+                yield from _set_down_in_clutter(primitives, planner, name)
+            else:
+                yield from primitives.put_back()
     yield from primitives.release(planner, name)
 
 

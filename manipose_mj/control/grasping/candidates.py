@@ -75,7 +75,7 @@ def postures(
     tcp_poses: Float[np.ndarray, "n 4 4"],
     near: Float[np.ndarray, "7"],
     *,
-    extra_seeds: Float[np.ndarray, "n 7"] | None = None,
+    extra_seeds: Float[np.ndarray, "*s n 7"] | None = None,
 ) -> tuple[Reach, ...]:
     """`reachable`, then for the poses that have them the second nearest solutions, and so on.
 
@@ -85,7 +85,7 @@ def postures(
         return (Reach(np.empty(0, int), np.empty((0, 7))),)
     seeds = seeds_for(tcp_poses)
     if extra_seeds is not None:
-        seeds = np.concatenate([seeds, extra_seeds[None]])
+        seeds = np.concatenate([seeds, extra_seeds.reshape(-1, len(tcp_poses), 7)])
     joints, solved = solve(tcp_poses, seeds)
     _, jacobian = forward(joints[solved])
     least = np.linalg.eigvalsh(jacobian @ jacobian.transpose(0, 2, 1))[:, 0]

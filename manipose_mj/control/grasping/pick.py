@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.control.grasping.approach import (
+    bent_approaches,
+    free_of_collision,
+    straight_approach,
+)
 from manipose_mj.control.grasping.candidates import (
     WIDE_MARGIN,
     Grasps,
@@ -32,7 +37,6 @@ from manipose_mj.poses import invert, pose_error, rotation_angle
 
 # How much nearer than usual fingers come to the table under a thin object, which they then touch softly [m].
 SOFT_TOUCH = 0.004
-_STANDOFFS = (0.10, 0.06)
 # Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
 # A grasp this far from the label's origin [m] counts as one unit worse than one at it.
 _LEVER = 0.08
@@ -40,14 +44,24 @@ _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
 _POSTURES = 3  # of the arm at a destination
-_FEW = 12  # free grasps, below which the arm is bent otherwise
 _THOROUGH = 4  # times as many, where nothing else works
 # Grasps nearer than this to one another hold alike [m, rad].
 _ALIKE = (0.02, 0.5)
 # What can be lifted so far has room around it: a path is taken for granted before it is needed [m].
 _ROOMY = 0.05
-# The approach may brush nothing, but the open fingers pass the object closely.
-APPROACH = replace(CONTACT, arm=0.002, target=0.0)
+
+
+@dataclass(frozen=True)
+class _Effort:
+    """Attributes: tries: times as many as usual; posture: the arm comes to each grasp by its nearest solution but so
+    many; bent: it is bent in any way that leaves an approach, and paths are sought for longer."""
+
+    tries: int = 1
+    posture: int = 0
+    bent: bool = False
+
+
+_USUAL = _Effort()
 
 
 @dataclass(frozen=True)
@@ -104,24 +118,30 @@ def pick_object(
     """
     grasps = object_grasps(obj)
     wider = replace(grasps, margin=WIDE_MARGIN)
-    attempts = [(planner, grasps, 1, 0), (planner, wider, 1, 0), (planner, grasps, 1, 1)]
+    attempts = [
+        (planner, grasps, _USUAL),
+        (planner, wider, _USUAL),
+        (planner, grasps, _Effort(posture=1)),
+    ]
+    others = grasps
     if len(slipped):
         others = grasps.take(np.flatnonzero(~_alike(obj, grasps, np.stack(slipped))))
-        attempts.insert(0, (planner, others, 1, 0))
+        attempts.insert(0, (planner, others, _USUAL))
     if obj.uncertainty > 0:
-        attempts.append((planner.touching_support(SOFT_TOUCH), grasps, 1, 0))
+        attempts.append((planner.touching_support(SOFT_TOUCH), grasps, _USUAL))
     if thorough:
-        attempts.append((planner, grasps, _THOROUGH, 0))
+        attempts.append((planner, grasps, _Effort(_THOROUGH)))
+        attempts.append((planner, others if len(others) else grasps, _Effort(bent=True)))
     failures = []
-    for allowing, candidates, effort, posture in attempts:
+    for allowing, candidates, effort in attempts:
         try:
-            return _pick(allowing, estimate, obj, destinations, candidates, effort, posture)
+            return _pick(allowing, estimate, obj, destinations, candidates, effort)
         except StageFailure as failure:
             failures.append(failure)
     if thorough and obj.sample_more is not None:
         more = object_grasps(replace(obj, sample_grasps=obj.sample_more))
         with suppress(StageFailure):
-            return _pick(planner, estimate, obj, destinations, more, 1, 0)
+            return _pick(planner, estimate, obj, destinations, more, _USUAL)
     raise failures[0] from None
 
 
@@ -140,25 +160,27 @@ def _pick(
     obj: ObjectEstimate,
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     grasps: Grasps,
-    effort: int,
-    posture: int,
+    effort: _Effort,
 ) -> ObjectPick:
-    """A pick among these grasps, to each of which the arm comes by the `posture`-th nearest solution first."""
-    reaches = postures(grasps.tcp_poses, estimate.joints)[posture:]
-    count = len(reaches[0].index) if reaches else 0
-    if not count:
-        raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")
-    free = _free_of_collision(planner, grasps, reaches, obj.geoms)
-    if not len(free.index):
-        raise StageFailure("plan", f"all {count} reachable grasps of {obj.name} collide")
+    """A pick among these grasps."""
     approaches: dict[int, Float[np.ndarray, "s 7"] | None] = {}
+    if effort.bent:
+        approaches.update(bent_approaches(planner, grasps, estimate.joints, obj.geoms))
+        free = _at_grasp(approaches)
+        if not approaches:
+            raise StageFailure("plan", f"no grasp of {obj.name} has a straight approach")
+    else:
+        free = _free(planner, estimate, obj, grasps, effort.posture)
     way = way_out(estimate, destinations[0][:3, 3]) if destinations else None
+    looked_at: set[int] = set()
     tries = 0
     for index, joints, goal in _with_destination(planner, grasps, free, obj, destinations):
         if index not in approaches:
-            approaches[index] = _approach(planner, grasps, index, joints, obj.geoms)
+            approaches[index] = straight_approach(planner, grasps, index, joints, obj.geoms)
+        looked_at.add(index)
         approach = approaches[index]
-        if tries == effort * _MAX_TRIES or len(approaches) == effort * _MAX_APPROACHES:
+        enough = len(looked_at) == effort.tries * _MAX_APPROACHES
+        if tries == effort.tries * _MAX_TRIES or enough:
             break
         if approach is None:
             continue
@@ -166,20 +188,52 @@ def _pick(
         retraction = _retract(planner, estimate, grasps, index, obj, joints)
         if destinations and (
             retraction is None
-            or not _can_transport(planner, grasps, index, obj, retraction, destinations, goal, way)
+            or not _can_transport(
+                planner, grasps, index, obj, retraction, destinations, goal, way, effort.bent
+            )
         ):
             continue
         width, opening = float(grasps.widths[index]), float(grasps.openings[index])
         query = CollisionQuery(opening=opening)
-        free_path = planner.free_path(estimate.joints, approach[0], query)
+        free_path = planner.free_path(
+            estimate.joints, approach[0], query, tight=effort.bent, patient=effort.bent
+        )
         if free_path is not None:
             return ObjectPick(free_path, approach, width, opening, goal, planner.support_allowance)
     counts = f"{len(free.index)} grasps of {obj.name} are free to take"
-    if not approaches:
+    if not looked_at:
         raise StageFailure("plan", f"{counts}, none can have it at its destination")
     if not tries:
-        raise StageFailure("plan", f"{counts}, none of {len(approaches)} has a straight approach")
+        raise StageFailure("plan", f"{counts}, none of {len(looked_at)} has a straight approach")
     raise StageFailure("plan", f"{counts}, none of {tries} could be carried out")
+
+
+def _free(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    obj: ObjectEstimate,
+    grasps: Grasps,
+    posture: int,
+) -> Reach:
+    """Grasps free to take, the arm coming to each by its `posture`-th nearest solution first.
+
+    Raises:
+      StageFailure: There are none.
+    """
+    reaches = postures(grasps.tcp_poses, estimate.joints)[posture:]
+    count = len(reaches[0].index) if reaches else 0
+    if not count:
+        raise StageFailure("plan", f"none of {len(grasps)} grasps of {obj.name} is in reach")
+    free = free_of_collision(planner, grasps, reaches, obj.geoms)
+    if not len(free.index):
+        raise StageFailure("plan", f"all {count} reachable grasps of {obj.name} collide")
+    return free
+
+
+def _at_grasp(approaches: Mapping[int, Float[np.ndarray, "s 7"] | None]) -> Reach:
+    """Where approaches by grasp lead to."""
+    ends = {index: way[-1] for index, way in approaches.items() if way is not None}
+    return Reach(np.array(list(ends), int), np.array(list(ends.values())).reshape(-1, 7))
 
 
 def pick_part(
@@ -200,22 +254,6 @@ def pick_part(
     """
     grip = grip_handle(planner, estimate, part, opening, in_stages=in_stages, following=following)
     return PartPick(grip.free_path, grip.approach, grip.width, grip.opening, grip.approach[-1])
-
-
-def _free_of_collision(
-    planner: MotionPlanner, grasps: Grasps, reaches: Sequence[Reach], target: np.ndarray
-) -> Reach:
-    """The grasps that are free as the arm comes to them first; where those are few, also as it comes otherwise."""
-    kept: dict[int, Float[np.ndarray, "7"]] = {}
-    for reach in reaches:
-        if len(kept) >= _FEW:
-            break
-        for index, joints in zip(reach.index.tolist(), reach.joints, strict=True):
-            query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
-            if index not in kept and not planner.collides(joints, query):
-                kept[index] = joints
-    index = np.array(sorted(kept), int)
-    return Reach(index, np.array([kept[i] for i in index.tolist()]).reshape(-1, 7))
 
 
 def _with_destination(
@@ -293,8 +331,12 @@ def _can_transport(
     destinations: tuple[Float[np.ndarray, "4 4"], ...],
     goal: Float[np.ndarray, "7"],
     way: Float[np.ndarray, "3"] | None,
+    patient: bool,
 ) -> bool:
-    """Whether the lifted object can be set down; where it cannot be lifted far, also on which path."""
+    """Whether the lifted object can be set down; where it cannot be lifted far, also on which path.
+
+    `patient`: whether to look for that long.
+    """
     attached = _attached(grasps, index, obj)
     pose_tcp = invert(grasps.tcp_poses[index]) @ obj.label_pose
     symmetry = obj.label.symmetry
@@ -304,25 +346,10 @@ def _can_transport(
     risen = planner.tcp_pose(retraction[-1])[2, 3] - planner.tcp_pose(retraction[0])[2, 3]
     if risen > _ROOMY:
         return True
-    return transport_path(planner, retraction[-1], place.above, attached) is not None
+    path = transport_path(planner, retraction[-1], place.above, attached, pressed=patient)
+    return path is not None
 
 
 def _attached(grasps: Grasps, index: int, obj: ObjectEstimate) -> AttachedObject:
     """The object in the hand, as this grasp would hold it."""
     return obj.attached_to(grasps.tcp_poses[index], float(grasps.widths[index]))
-
-
-def _approach(
-    planner: MotionPlanner,
-    grasps: Grasps,
-    index: int,
-    joints: Float[np.ndarray, "7"],
-    target: np.ndarray,
-) -> Float[np.ndarray, "s 7"] | None:
-    """Joint targets of a straight approach to the grasp; None if there is none."""
-    query = CollisionQuery(APPROACH, opening=float(grasps.openings[index]), target=target)
-    for standoff in _STANDOFFS:
-        back = planner.line(joints, planner.backed_off(joints, standoff), query)
-        if back is not None:
-            return np.concatenate([back[::-1], joints[None]])
-    return None

@@ -172,7 +172,7 @@ def transport_path(
     """Joint targets from rest to rest with what is held; None if no path was found.
 
     Through free space; from under a roof, where there is little room, at first back as the hand came; what is `pressed`
-    for a path passes all else nearer in the end.
+    for a path passes all else nearer in the end, or is sought one for longer.
     """
     free = planner.free_path(start, goal, attached.query())
     if free is not None:
@@ -185,7 +185,12 @@ def transport_path(
         free = planner.free_path(pull[-1], goal, attached.query())
         if free is not None:
             return np.concatenate([pull, free])
-    return planner.free_path(start, goal, attached.query(), near=True) if pressed else None
+    if not pressed:
+        return None
+    near = planner.free_path(start, goal, attached.query(), near=True)
+    return (
+        near if near is not None else planner.free_path(start, goal, attached.query(), patient=True)
+    )
 
 
 def equivalent_poses(

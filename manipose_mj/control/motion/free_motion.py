@@ -82,11 +82,17 @@ class _Tree:
     def __init__(self, root: np.ndarray) -> None:
         self.nodes = [root]
         self.parents = [-1]
+        self._rows = np.empty((256, len(root)))  # the nodes once more, with room for others
+        self._rows[0] = root
 
     def nearest(self, q: np.ndarray) -> int:
-        return int(np.argmin(((np.stack(self.nodes) - q) ** 2).sum(axis=1)))
+        rows = self._rows[: len(self.nodes)]
+        return int(np.argmin(((rows - q) ** 2).sum(axis=1)))
 
     def add(self, q: np.ndarray, parent: int) -> int:
+        if len(self.nodes) == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[len(self.nodes)] = q
         self.nodes.append(q)
         self.parents.append(parent)
         return len(self.nodes) - 1

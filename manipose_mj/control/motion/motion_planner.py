@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.control.motion.arm_model import ArmModel
-from manipose_mj.control.motion.free_motion import plan_path
+from manipose_mj.control.motion.free_motion import FreeMotionConfig, plan_path
 from manipose_mj.control.motion.line_motion import LineConfig, line_poses, track
 from manipose_mj.control.motion.trajectory import Timing, timed, tracked
 from manipose_mj.control.scene.collision_query import (
@@ -29,6 +29,7 @@ _SUPPORT_DISTANCE = 0.02
 _CLEARANCES = ((TRANSIT, ROUNDED), (ROUNDED, GRAZING), (GRAZING, GRAZING))
 _EXCUSED = 0.001  # how much deeper a robot may be than at the start, in what it starts in [m]
 _SPEED_SHARES = (1.0, 0.5, 0.25)
+_PATIENT = FreeMotionConfig(max_nodes=8000)
 _TIMING = Timing()
 _LINE = LineConfig()
 # Near a stretched arm the joints must turn fast for the hand to move slowly.
@@ -125,6 +126,7 @@ class MotionPlanner:
         *,
         tight: bool = False,
         near: bool = False,
+        patient: bool = False,
     ) -> Float[np.ndarray, "t 7"] | None:
         """Joint targets from rest to rest through free space; None if no path was found.
 
@@ -136,6 +138,7 @@ class MotionPlanner:
           query: What to assume; clearances are chosen here.
           tight: See `goal`.
           near: Pass all else as near as at rounded corners.
+          patient: Look for it long.
         """
         query = query or CollisionQuery()
         if self.collides(goal, query.keeping(GRAZING if tight else TRANSIT)):
@@ -147,7 +150,7 @@ class MotionPlanner:
             if self.collides(start, widely) or (tight and self.collides(goal, widely)):
                 continue
             collides = partial(self.scene.in_collision, query=self._allowing(widely))
-            path = plan_path(start, goal, collides, self.rng)
+            path = plan_path(start, goal, collides, self.rng, _PATIENT if patient else None)
             if path is None:
                 return None
             # Rounded corners leave the path that was checked; slower motions leave it less.

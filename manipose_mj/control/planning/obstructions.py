@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.control.grasping.approach import APPROACH
 from manipose_mj.control.grasping.candidates import (
     OPENING_MARGIN,
     WIDE_MARGIN,
@@ -14,7 +15,6 @@ from manipose_mj.control.grasping.candidates import (
     object_grasps,
     reachable,
 )
-from manipose_mj.control.grasping.pick import APPROACH
 from manipose_mj.control.motion.batch_ik import solve
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.grasp_table import GraspTable
