@@ -273,7 +273,7 @@ class Baseline:
                 destination = _destination(plan, index)
                 yield from primitives.grasp_at(planner, step.subject, destination, thorough)
             elif step.primitive == "move_to":
-                yield from primitives.move_to(planner, step)
+                yield from primitives.move_to(planner, step, thorough)
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()

@@ -109,10 +109,10 @@ def retreat_from(
         line = retreat(pushing, estimate, released.geoms, touched, distances, near, excused)
         if line is not None:
             return line
-    line = retreat(planner, estimate, released.geoms, touched, (_LEAST_RETREAT,), near)
-    if line is not None:
-        return line
     near_by = CollisionQuery(replace(CONTACT, arm=-np.inf, target=_LOST), target=released.geoms)
     if name in estimate.objects and not planner.collides(estimate.joints, near_by):
         return estimate.joints[None]  # there is nothing to back off from
+    line = retreat(planner, estimate, released.geoms, touched, (_LEAST_RETREAT,), near)
+    if line is not None:
+        return line
     raise StageFailure("release", f"no way to back off from {name}")

@@ -133,8 +133,11 @@ class Primitives:
             estimate = self._executor.observe()  # a handle is where the hand has it
         self._held = _Held(name, pick, pose_in_hand(estimate, name))
 
-    def move_to(self, planner: MotionPlanner, step: Step) -> Actions:
-        """Bring what is held to its destination."""
+    def move_to(self, planner: MotionPlanner, step: Step, thorough: bool = False) -> Actions:
+        """Bring what is held to its destination.
+
+        `thorough`: whether to look long for a path.
+        """
         if self._held is None and step.opening is not None:
             yield from self._push_part(planner, step.subject, step.opening)
         elif self._held is None:
@@ -142,7 +145,7 @@ class Primitives:
         elif isinstance(self._held.pick, PartPick):
             yield from self._move_part(planner, step)
         else:
-            yield from self._move_object(planner, step, self._held.pick)
+            yield from self._move_object(planner, step, self._held.pick, thorough)
 
     def release(self, planner: MotionPlanner, name: str) -> Actions:
         """Let go and back off along the approach."""
@@ -191,7 +194,9 @@ class Primitives:
         estimate = self._executor.observe()
         return estimate, planner.within(estimate.scene)
 
-    def _move_object(self, planner: MotionPlanner, step: Step, pick: ObjectPick) -> Actions:
+    def _move_object(
+        self, planner: MotionPlanner, step: Step, pick: ObjectPick, thorough: bool
+    ) -> Actions:
         name = step.subject
         planner = planner.touching_support(pick.support_allowance)
         estimate, planner = self._observe(planner)
@@ -208,7 +213,9 @@ class Primitives:
         if place is None:
             raise StageFailure("plan", f"no way to set {name} down where it should go")
         attached = estimate.in_hand(name)
-        free = transport_path(planner, estimate.joints, place.above, attached, pressed=True)
+        free = transport_path(
+            planner, estimate.joints, place.above, attached, pressed=True, patient=thorough
+        )
         if free is None:
             raise StageFailure("plan", f"no path for {name} to where it should go")
         self._lifted = None

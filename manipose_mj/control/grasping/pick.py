@@ -346,7 +346,7 @@ def _can_transport(
     risen = planner.tcp_pose(retraction[-1])[2, 3] - planner.tcp_pose(retraction[0])[2, 3]
     if risen > _ROOMY:
         return True
-    path = transport_path(planner, retraction[-1], place.above, attached, pressed=patient)
+    path = transport_path(planner, retraction[-1], place.above, attached, patient=patient)
     return path is not None
 
 

@@ -168,11 +168,12 @@ def transport_path(
     attached: AttachedObject,
     *,
     pressed: bool = False,
+    patient: bool = False,
 ) -> Float[np.ndarray, "t 7"] | None:
     """Joint targets from rest to rest with what is held; None if no path was found.
 
     Through free space; from under a roof, where there is little room, at first back as the hand came; what is `pressed`
-    for a path passes all else nearer in the end, or is sought one for longer.
+    for a path passes all else nearer in the end; who is `patient` looks for longer then.
     """
     free = planner.free_path(start, goal, attached.query())
     if free is not None:
@@ -185,12 +186,11 @@ def transport_path(
         free = planner.free_path(pull[-1], goal, attached.query())
         if free is not None:
             return np.concatenate([pull, free])
-    if not pressed:
-        return None
-    near = planner.free_path(start, goal, attached.query(), near=True)
-    return (
-        near if near is not None else planner.free_path(start, goal, attached.query(), patient=True)
-    )
+    if pressed:
+        free = planner.free_path(start, goal, attached.query(), near=True)
+    if free is None and patient:
+        free = planner.free_path(start, goal, attached.query(), patient=True)
+    return free
 
 
 def equivalent_poses(

@@ -32,8 +32,11 @@ def test_only_a_path_that_is_needed_may_pass_near_or_take_long():
     assert transport_path(planner, HOME, HOME, held) is None  # type: ignore[arg-type]
     assert set(asked) == {"usual"}
     asked.clear()
-    assert transport_path(planner, HOME, HOME, held, pressed=True) is not None  # type: ignore[arg-type]
-    assert asked == ["usual", "near", "patient"]
+    assert transport_path(planner, HOME, HOME, held, pressed=True) is None  # type: ignore[arg-type]
+    assert asked == ["usual", "near"]
+    asked.clear()
+    path = transport_path(planner, HOME, HOME, held, pressed=True, patient=True)  # type: ignore[arg-type]
+    assert path is not None and asked == ["usual", "near", "patient"]
 
 
 @pytest.mark.parametrize(("near", "clearance"), [(False, TRANSIT), (True, ROUNDED)])
