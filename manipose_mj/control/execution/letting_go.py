@@ -32,7 +32,9 @@ _SETTLE = 0.25  # after letting go [s]
 _HANGS = 0.03  # how far a hand that still hangs on a handle is from where it should have backed off to [m]
 
 
-def let_go(executor: Executor, planner: MotionPlanner, name: str) -> Actions:
+def let_go(
+    executor: Executor, planner: MotionPlanner, name: str, *, close: bool = False
+) -> Actions:
     """Open the hand and back off from what it holds.
 
     A handle whose shape is estimated may be wider in front of the fingers than between them: where the hand does not come
@@ -42,6 +44,7 @@ def let_go(executor: Executor, planner: MotionPlanner, name: str) -> Actions:
       executor: Of actions.
       planner: Says what to assume.
       name: Of the object or part.
+      close: Whether it was taken where there is little room to come to it.
 
     Raises:
       StageFailure: There is no way back.
@@ -55,7 +58,7 @@ def let_go(executor: Executor, planner: MotionPlanner, name: str) -> Actions:
     for last in (False, True):
         estimate = executor.observe()
         planner = planner.within(estimate.scene)
-        line = retreat_from(planner, estimate, name, _OWN_PART if felt else None)
+        line = retreat_from(planner, estimate, name, _OWN_PART if felt else None, close=close)
         yield from executor.follow(line)
         if last or not felt or _off(executor.joints(), line[-1]) < _HANGS:
             return
@@ -88,7 +91,12 @@ def opening_to_let_go(planner: MotionPlanner, estimate: SceneEstimate, name: str
 
 
 def retreat_from(
-    planner: MotionPlanner, estimate: SceneEstimate, name: str, near: float | None = None
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    name: str,
+    near: float | None = None,
+    *,
+    close: bool = False,
 ) -> Float[np.ndarray, "t 7"]:
     """Joint targets back off from what was let go; where nothing else is left, past neighbours that give way.
 
@@ -97,12 +105,15 @@ def retreat_from(
       estimate: What is where.
       name: Of what was let go.
       near: How near the hand may be to it on the way, negative for touching [m]; None: as is usual.
+      close: Whether a short way back will do.
 
     Raises:
       StageFailure: There is no way.
     """
     released = estimate.parts.get(name) or estimate.objects[name]
     distances = HANDLE_RETREATS if name in estimate.parts else RETREATS
+    if close:
+        distances = (*distances, _LEAST_RETREAT)
     touched = frozenset({planner.body_name(released.body)})
     for excused, allowance in product((False, True), (0.0, *_GIVING_WAY)):
         pushing = planner.allowing(max(allowance, planner.contact_allowance))
@@ -112,7 +123,4 @@ def retreat_from(
     near_by = CollisionQuery(replace(CONTACT, arm=-np.inf, target=_LOST), target=released.geoms)
     if name in estimate.objects and not planner.collides(estimate.joints, near_by):
         return estimate.joints[None]  # there is nothing to back off from
-    line = retreat(planner, estimate, released.geoms, touched, (_LEAST_RETREAT,), near)
-    if line is not None:
-        return line
     raise StageFailure("release", f"no way to back off from {name}")

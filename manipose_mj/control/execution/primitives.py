@@ -158,7 +158,7 @@ class Primitives:
         if not isinstance(held.pick, PartPick):
             self._released[name] = held.pose_tcp
         planner = planner.touching_support(held.pick.support_allowance)
-        yield from let_go(self._executor, planner, name)
+        yield from let_go(self._executor, planner, name, close=held.pick.close)
 
     def avoid_last_grasps(self) -> None:
         """Objects were set down, and it did not do: take them another way next time."""

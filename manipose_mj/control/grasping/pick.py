@@ -76,6 +76,7 @@ class ObjectPick:
       goal: A configuration in which the object is where it shall go; the grasp's own if it goes
         nowhere.
       support_allowance: As the planner's that found it [m].
+      close: Whether there is little room to come to it.
     """
 
     free_path: Float[np.ndarray, "t 7"]
@@ -84,6 +85,7 @@ class ObjectPick:
     opening: float
     goal: Float[np.ndarray, "7"]
     support_allowance: float = 0.0
+    close: bool = False
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,8 @@ def _pick(
             estimate.joints, approach[0], query, tight=effort.bent, patient=effort.bent
         )
         if free_path is not None:
-            return ObjectPick(free_path, approach, width, opening, goal, planner.support_allowance)
+            allowance = planner.support_allowance
+            return ObjectPick(free_path, approach, width, opening, goal, allowance, effort.bent)
     counts = f"{len(free.index)} grasps of {obj.name} are free to take"
     if not looked_at:
         raise StageFailure("plan", f"{counts}, none can have it at its destination")

@@ -50,7 +50,7 @@ class Hand:
 @pytest.mark.parametrize(("needs", "opened"), [(0.01, [0.02]), (0.05, [0.02, MAX_OPENING])])
 def test_a_hand_that_hangs_on_a_handle_opens_all_the_way(monkeypatch, needs, opened):
     monkeypatch.setattr(letting_go, "opening_to_let_go", lambda *_: 0.02)
-    monkeypatch.setattr(letting_go, "retreat_from", lambda *_: np.stack([HOME, AWAY]))
+    monkeypatch.setattr(letting_go, "retreat_from", lambda *_, **__: np.stack([HOME, AWAY]))
     hand = Hand(needs)
     planner = SimpleNamespace()
     planner.within = lambda scene: planner
