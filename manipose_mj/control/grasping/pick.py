@@ -37,12 +37,13 @@ from manipose_mj.poses import invert, pose_error, rotation_angle
 
 # How much nearer than usual fingers come to the table under a thin object, which they then touch softly [m].
 SOFT_TOUCH = 0.004
-# Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
 # A grasp this far from the label's origin [m] counts as one unit worse than one at it.
 _LEVER = 0.08
+# Pairs of grasp and destination looked at, straight approaches and complete picks tried, at most.
 _MAX_PAIRS = 2400
 _MAX_APPROACHES = 40
 _MAX_TRIES = 12
+_BENT_TRIES = 4  # complete picks where each may take a long search
 _POSTURES = 3  # of the arm at a destination
 _THOROUGH = 4  # times as many, where nothing else works
 # Grasps nearer than this to one another hold alike [m, rad].
@@ -182,7 +183,7 @@ def _pick(
         looked_at.add(index)
         approach = approaches[index]
         enough = len(looked_at) == effort.tries * _MAX_APPROACHES
-        if tries == effort.tries * _MAX_TRIES or enough:
+        if tries == (_BENT_TRIES if effort.bent else effort.tries * _MAX_TRIES) or enough:
             break
         if approach is None:
             continue
