@@ -66,7 +66,8 @@ class ShelfPlaces:
         yaw = random_state.uniform(-np.pi, np.pi)
         u, v = random_state.uniform(size=2)
         origin = pose_on_table(asset, stable, np.zeros(2), yaw)
-        half = _half_lengths(shelf_pose[:3, :3].T @ origin[:3, :3] @ asset.label.rotation, asset)
+        rotation = origin[:3, :3] @ asset.label.rotation
+        half = _half_lengths(shelf_pose[:3, :3].T @ rotation, asset)
         if zone == "table":
             xy, floor = self._on_table(u, v, half, shelf_pose), 0.0
         elif zone == "by":
@@ -78,7 +79,10 @@ class ShelfPlaces:
             xy = self._on_board(u, v, half, shelf_pose)
             if 2 * half[2] + _HEADROOM > height:
                 return None
-        return None if xy is None else pose_on_table(asset, stable, xy, yaw, floor)
+        if xy is None:
+            return None
+        # What is placed is the middle; the label's origin of a tool lies beside it.
+        return pose_on_table(asset, stable, xy - (rotation @ asset.label.center)[:2], yaw, floor)
 
     def level(self, zone: Zone) -> int | None:
         """Which of the shelf's levels a zone is; None outside."""

@@ -15,7 +15,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.mjcf.shelf import ShelfConfig
 from manipose_mj.mjcf.sleep import sleep_disabled
-from manipose_mj.poses import compose, invert, pose_error, rotation_about
+from manipose_mj.poses import compose, invert, pose_error, rotation_about, transform
 from manipose_mj.tasks.goals import OrientationGoal
 from manipose_mj.tasks.scene.resting import (
     label_ups,
@@ -230,6 +230,24 @@ def test_objects_start_by_in_and_under_the_shelf_and_overlap_nothing(position):
         assert _level(goal[:3, 3]) in ("beside", "in")
     assert {"beside", "under", "in"} == set(levels)
     assert all(levels.count(level) > 8 for level in set(levels))
+
+
+def test_a_tool_lies_within_the_walls_though_its_origin_is_beside_its_middle():
+    hammer, shelf = catalogue.load("hammer", 0), PLACES.shelf
+    assert np.linalg.norm(hammer.label.center) > 0.02
+    low, high = hammer.label.bounds
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3)
+    random_state, count = np.random.RandomState(0), 0
+    for _ in range(200):
+        shelf_pose = PLACES.draw_shelf(random_state)
+        pose = PLACES.draw("in", hammer, 0, shelf_pose, random_state)
+        if pose is None:
+            continue
+        count += 1
+        x, y, _ = transform(invert(shelf_pose) @ pose @ hammer.label.pose, corners).T
+        assert x.min() > 0 and x.max() < shelf.depth
+        assert np.abs(y).max() < shelf.width / 2 - shelf.thickness
+    assert count > 20
 
 
 LEVELS = {"beside": None, "under": 0, "in": 1}
