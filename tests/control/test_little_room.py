@@ -9,7 +9,7 @@ from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
 # No straight approach but with the arm bent otherwise; no path but after a long search; no way to set down what was
 # taken, which goes back and is taken otherwise.
-SEEDS = (2614, 2641, 2602)
+SEEDS = (2614, 2671, 2602)
 
 
 @pytest.mark.full
