@@ -114,7 +114,8 @@ def pick_object(
       obj: What to take.
       destinations: `T_world_label` that it shall go to, any of them; empty if it only is to be held.
       slipped: `T_tcp_label` of grasps that did not hold.
-      thorough: Whether to try many more grasps in the end, and to sample more if it can be, which takes long.
+      thorough: Whether to try many more grasps in the end, the arm bent in many ways, and to sample more if it can be;
+        which takes long.
 
     Raises:
       StageFailure: There is none; the reason says at which filter the last ones fell.
