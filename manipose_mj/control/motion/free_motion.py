@@ -80,22 +80,23 @@ def edge_is_free(
 
 class _Tree:
     def __init__(self, root: np.ndarray) -> None:
-        self.nodes = [root]
         self.parents = [-1]
-        self._rows = np.empty((256, len(root)))  # the nodes once more, with room for others
+        self._rows = np.empty((256, len(root)))  # nodes, then room for others
         self._rows[0] = root
 
+    @property
+    def nodes(self) -> Float[np.ndarray, "n 7"]:
+        return self._rows[: len(self.parents)]
+
     def nearest(self, q: np.ndarray) -> int:
-        rows = self._rows[: len(self.nodes)]
-        return int(np.argmin(((rows - q) ** 2).sum(axis=1)))
+        return int(np.argmin(((self.nodes - q) ** 2).sum(axis=1)))
 
     def add(self, q: np.ndarray, parent: int) -> int:
-        if len(self.nodes) == len(self._rows):
+        if len(self.parents) == len(self._rows):
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[len(self.nodes)] = q
-        self.nodes.append(q)
+        self._rows[len(self.parents)] = q
         self.parents.append(parent)
-        return len(self.nodes) - 1
+        return len(self.parents) - 1
 
     def path(self, index: int) -> list[np.ndarray]:
         """From a node to the root."""
