@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from asset_pipeline.geometry.surface_points import surface_points
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.poses import SymmetryGroup
+from manipose_mj.poses import SymmetryGroup, rotation_about
 
 UP = np.array([0.0, 0.0, 1.0])
 SPACING = 0.0015  # of the points that stand for the surface [m]
@@ -19,6 +19,8 @@ APART = 0.005  # more than this between two pieces of a slice parts bar and plat
 BAR = 1.5
 # A handle runs along an axis of the frame unless it is at least this far from all of them.
 SLANT = np.deg2rad(4.0)
+# Turns about Y that stand for all of them: of round knobs.
+ROUND = 24
 # Two shapes are one if no point is farther from the other's than this, or this share of the length.
 ALIKE, ALIKE_SHARE = 0.001, 0.025
 
@@ -99,9 +101,12 @@ def _cross_section(
 
 
 def _symmetry(points: Float[np.ndarray, "n 3"], length: float) -> SymmetryGroup:
-    """Half a turn about Y, where that leaves the shape as it is; points are about the origin."""
-    half = np.diag([-1.0, 1.0, -1.0])
-    gaps, _ = KDTree(points).query(points @ half)
-    if np.quantile(gaps, 0.98) > max(ALIKE, ALIKE_SHARE * length) + SPACING:
-        return SymmetryGroup.identity()
-    return SymmetryGroup(np.stack([np.eye(3), half]))
+    """The most turns about Y that leave the shape as it is; points are about the origin."""
+    tree, far = KDTree(points), max(ALIKE, ALIKE_SHARE * length) + SPACING
+    for count in (ROUND, 4, 2):
+        turns = [
+            rotation_about(np.array([0.0, 1.0, 0.0]), 2 * np.pi * k / count) for k in range(count)
+        ]
+        if all(np.quantile(tree.query(points @ turn)[0], 0.98) <= far for turn in turns[1:]):
+            return SymmetryGroup(np.stack(turns))
+    return SymmetryGroup.identity()

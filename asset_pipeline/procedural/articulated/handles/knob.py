@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from asset_pipeline.labelling.handle_label import ROUND
 from asset_pipeline.procedural.articulated.handles.mounted import (
     ALUMINIUM,
     Direction,
@@ -26,7 +27,7 @@ from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 SECTIONS = 32
 CORNERS = 10  # of the collision parts' sections
 # The outward axis of revolution is Y, and a symmetry group has every turn about X or a finite number.
-TURNS = 24
+TURNS = ROUND
 # From the face outwards, z on the axis: rotates into -x.
 OUTWARDS = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
