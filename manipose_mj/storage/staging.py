@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 PREFIX = ".building-"
-LOCK = "lock"
+LOCK = f"{PREFIX}lock"  # beside what is built, so by no name that it may have
 
 
 @contextmanager

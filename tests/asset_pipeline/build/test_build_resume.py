@@ -19,7 +19,7 @@ from asset_pipeline.build.workers.limited_call import Limits
 from asset_pipeline.catalogue.parallel_build import build_catalogue
 from manipose_mj.assets import catalogue, categories
 from manipose_mj.errors import InputError
-from manipose_mj.storage.staging import clear_staging, put_in_place, staging
+from manipose_mj.storage.staging import LOCK, clear_staging, put_in_place, staging
 from tests.places import ROOT
 
 SOURCE = "google_scanned_objects"
@@ -132,7 +132,7 @@ def test_folders_of_the_dead_are_removed_and_those_of_the_living_are_not(tmp_pat
     folder = tmp_path / "thing"
     left = tmp_path / ".building-thing-left"
     left.mkdir()
-    (left / "lock").touch()
+    (left / LOCK).touch()
     with staging(folder) as mine:
         clear_staging(tmp_path)
         assert not left.exists() and mine.is_dir()
