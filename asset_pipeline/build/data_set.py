@@ -15,6 +15,7 @@ import numpy as np
 from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
 from asset_pipeline.build.relabel import OVERRIDE, relabelled, write_measured
+from asset_pipeline.build.replaceable import PLACE, check_origin, place
 from asset_pipeline.build.rigid import finish_rigid
 from asset_pipeline.build.workers.limited_call import LimitError, Limits, limited_call
 from asset_pipeline.geometry.convexify import ConvexSettings, convexify
@@ -25,7 +26,7 @@ from asset_pipeline.labelling.overrides.reading import LABELS_FILE, Override, re
 from asset_pipeline.labelling.scan_label import scan_label
 from asset_pipeline.sources import google_scanned_objects, meshes, omniobject3d, pace, ycb
 from asset_pipeline.sources.articulated_scan import ArticulatedScan
-from asset_pipeline.sources.meshes import MeshOptions
+from asset_pipeline.sources.meshes import MeshItem, MeshOptions
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from asset_pipeline.sources.scan import Scan, ScanItem, write_texture
 from manipose_mj.assets.asset import Asset
@@ -114,6 +115,7 @@ def build(
                 build=build_item,
                 arguments=(source, found[name], overrides.get(name)),
                 limits=limits,
+                sources=found[name].files,
             )
             for name in (sorted(set(only)) or sorted(found))
         ],
@@ -128,12 +130,16 @@ def build_item(
     """Build one object into `target`, and return True, unless `folder` is up to date.
 
     Raises:
-      InputError: The object, or what a person said of its label, cannot be used.
+      InputError: The object, or what a person said of its label, cannot be used; or `folder` is the asset of
+        another mesh.
     """
     module = SOURCES[source]
     said = {} if override is None else {OVERRIDE: override.digest}
-    if up_to_date(folder, module.inputs(item) | said, generator()):
+    inputs = module.inputs(item)
+    if up_to_date(folder, inputs | said, generator()):
         return False
+    if isinstance(item, MeshItem):
+        check_origin(folder, item.file, meshes.SOURCE, inputs)
     with module.opened(item) as scan:
         if isinstance(scan, ArticulatedScan):
             provenance = replace(scan.provenance, generator=generator())
@@ -141,7 +147,11 @@ def build_item(
             if override is not None:
                 relabelled(asset, override)
         else:
-            build_scan(scan, target, override)
+            provenance = scan.provenance
+            if isinstance(item, MeshItem):
+                where = {PLACE: place(item.file, folder)}
+                provenance = replace(provenance, inputs=provenance.inputs | where)
+            build_scan(replace(scan, provenance=provenance), target, override)
     return True
 
 
@@ -221,12 +231,13 @@ def generator() -> str:
 
 
 def up_to_date(folder: Path, inputs: dict[str, str], generator: str) -> bool:
-    """Whether an asset folder was built from these inputs by this generator."""
+    """Whether an asset folder was built from these inputs by this generator, wherever they lay."""
     try:
         provenance = read_asset(folder).provenance
     except InputError:
         return False
-    return provenance.inputs == inputs and provenance.generator == generator
+    found = {key: value for key, value in provenance.inputs.items() if key != PLACE}
+    return found == inputs and provenance.generator == generator
 
 
 def require_writable(out: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from joblib import Parallel, delayed
 
+from asset_pipeline.build.replaceable import check_replaceable
 from asset_pipeline.build.workers.limited_call import (
     LimitError,
     Limits,
@@ -38,6 +39,7 @@ class BuildJob:
         False where `folder` is up to date. Importable by name; runs in another process.
       arguments: Of `build`.
       limits: Where to stop it; None for code of ours, which is called without.
+      sources: Files that it is built from: `folder` must not hold them, for it is replaced whole.
     """
 
     name: str
@@ -46,6 +48,7 @@ class BuildJob:
     build: Callable[..., bool]
     arguments: tuple[Any, ...]
     limits: Limits | None
+    sources: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,7 @@ def _run(job: BuildJob) -> BuildResult:
 
 def _outcome(job: BuildJob) -> Outcome:
     try:
+        check_replaceable(job.folder, job.sources)
         with staging(job.folder) as scratch:
             target = scratch / job.folder.name
             arguments = (*job.arguments, job.folder, target)

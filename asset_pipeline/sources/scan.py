@@ -45,6 +45,11 @@ class ScanItem:
     member: str = ""
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """What is read of it, as far as it is known before it is opened: its mesh, or the archive that holds it."""
+        return (self.path / self.member if self.member and self.path.is_dir() else self.path,)
+
+    @property
     def where(self) -> str:
         """What messages name: the object's own folder, or the archive that holds it."""
         return str(
