@@ -8,6 +8,7 @@ frame is kept, scaled to metres. Nothing is claimed of where a mesh comes from.
 from __future__ import annotations
 
 import logging
+import os
 import re
 import tempfile
 from collections import Counter
@@ -19,13 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from asset_pipeline.sources.categories import Kind, kind_of, kind_of_product
-from asset_pipeline.sources.files.mesh_file import (
-    ANONYMOUS,
-    MESHES,
-    MeshFile,
-    companions,
-    read_mesh_file,
-)
+from asset_pipeline.sources.files.mesh_file import ANONYMOUS, MeshFile, read_mesh_file
+from asset_pipeline.sources.files.near_files import MESHES, companions, is_hidden
 from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up, suits
 from asset_pipeline.sources.scan import Scan, ScanItem, check_scan_mesh, sha256
 from manipose_mj.assets.asset import Provenance
@@ -52,6 +48,9 @@ class MeshOptions:
       up: `"x"`, `"y"`, `"z"`, `"-x"`, `"-y"` or `"-z"`.
       unit: `"m"`, `"cm"`, `"mm"`, `"in"`, `"ft"` or a number of metres.
       licence: Under which the meshes may be used; without it the asset says that it is unknown.
+
+    Raises:
+      InputError: One of them cannot be meant.
     """
 
     category: str | None = None
@@ -61,8 +60,17 @@ class MeshOptions:
     licence: str | None = None
 
     def __post_init__(self) -> None:
-        if self.category is not None and not self.category.strip():
-            raise InputError("the category is empty; expected a word such as mug")
+        if self.category is not None:
+            kind = kind_of(self.category)
+            if not kind.category:
+                raise InputError(
+                    f"--category {self.category!r} has no letter or digit; expected a word such as mug"
+                )
+            if self.object_type is None and kind.object_type not in TYPES:
+                raise InputError(
+                    f"--category {self.category}: has parts that move, which a mesh does not tell; "
+                    "say --type for one that is rigid, or another category"
+                )
         if self.up is not None and self.up not in AXES:
             raise unknown_name("axis", self.up, AXES)
         if self.object_type is not None and self.object_type not in TYPES:
@@ -80,7 +88,7 @@ class MeshOptions:
             if kind.category not in CATALOGUE:
                 hint = unknown_name("category", self.category, CATALOGUE)
                 found.append(
-                    f"{hint} It is labelled as {kind.object_type}; say --type where that is wrong"
+                    f"labelled as {kind.object_type}, say --type where that is wrong: {hint}"
                 )
         return found
 
@@ -120,7 +128,9 @@ def metres(unit: str) -> float:
 
 
 def items(path: Path, options: MeshOptions) -> list[MeshItem]:
-    """The meshes at `path`: the file itself, or those in the folder and in its folders.
+    """The meshes at `path`: the file itself, or those in the folder and in its folders, but for hidden ones.
+
+    Meshes farther down and links that lead nowhere are left out, with a warning.
 
     Raises:
       InputError: `path` does not exist, or holds no mesh.
@@ -131,13 +141,7 @@ def items(path: Path, options: MeshOptions) -> list[MeshItem]:
             raise InputError(f"{path}: no mesh that can be read; expected one of {expected}")
         root, files = path.parent, [path]
     elif path.is_dir():
-        root = path
-        files = [
-            file
-            for pattern in ("*", "*/*")
-            for file in sorted(path.glob(pattern))
-            if file.suffix.lower() in MESHES and file.is_file()
-        ]
+        root, files = path, _meshes_in(path)
     else:
         raise InputError(f"{path}: no such file or folder; expected a mesh or a folder of meshes")
     if not files:
@@ -219,9 +223,9 @@ def opened(item: MeshItem) -> Iterator[Scan]:
 def _unit(found: MeshFile, category: str, file: Path) -> tuple[str, str]:
     """The unit that nobody gave, and where it is from."""
     vertices = np.asarray(found.mesh.vertices)
-    if not np.isfinite(vertices).all():
-        return "m", "for want of finite coordinates"  # which is refused next
-    longest = float(np.ptp(vertices, axis=0).max())
+    longest = float(np.ptp(vertices, axis=0).max()) if np.isfinite(vertices).all() else 0.0
+    if longest == 0:
+        return "m", "for want of a size"  # which is refused next
     if found.unit is not None and suits(found.unit * longest, category):
         return f"{found.unit:g}", "as the file says"
     try:
@@ -230,10 +234,45 @@ def _unit(found: MeshFile, category: str, file: Path) -> tuple[str, str]:
         raise InputError(f"{file}: {error}") from None
 
 
+def _meshes_in(folder: Path) -> list[Path]:
+    """Those in a folder and in its folders, and a warning of what is left out."""
+    found, broken, deep = [], [], []
+    for pattern in ("*", "*/*"):
+        for file in sorted(folder.glob(pattern)):
+            if _is_shown_mesh(file.relative_to(folder)):
+                if file.is_file():
+                    found.append(file)
+                elif file.is_symlink():
+                    broken.append(file)
+    for place, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not is_hidden(name))
+        files = (Path(place, name).relative_to(folder) for name in sorted(names))
+        deep += [file for file in files if len(file.parts) > 2 and _is_shown_mesh(file)]
+    for left, what in (
+        (deep, "lie more than one folder down; name their folder as PATH to build them"),
+        (broken, "are links that lead nowhere"),
+    ):
+        if left:
+            first = left[0] if left is deep else left[0].relative_to(folder)
+            log.warning(
+                "%s: left out %d meshes, which %s: %s%s",
+                folder,
+                len(left),
+                what,
+                first,
+                "" if len(left) == 1 else " and others",
+            )
+    return found
+
+
+def _is_shown_mesh(file: Path) -> bool:
+    return file.suffix.lower() in MESHES and not any(map(is_hidden, file.parts))
+
+
 def _name(file: Path) -> str:
     """Of the file; of its folder where the file's says nothing."""
     anonymous = file.stem.lower() in ANONYMOUS
-    return _spelt(file.resolve().parent.name if anonymous else file.stem)
+    return _spelt(file.parent.resolve().name if anonymous else file.stem)
 
 
 def _spelt(text: str) -> str:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from PIL import Image
 
 from asset_pipeline.geometry.repair import drop_flaps, open_edges, spikes, turn_outwards
+from asset_pipeline.sources.files.wavefront_lines import without_mark
 from manipose_mj.assets.asset import Provenance
 from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError
@@ -103,7 +104,14 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
       InputError: The file is missing or unreadable, or its mesh cannot be an object on a table.
     """
     try:
-        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+        with without_mark(path) as file:
+            mesh = trimesh.load(
+                file,
+                file_type=path.suffix[1:].lower(),
+                force="mesh",
+                process=False,
+                skip_materials=True,
+            )
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; expected a mesh") from None
     except Exception as error:  # each of trimesh's readers fails in its own way

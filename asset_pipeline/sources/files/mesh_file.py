@@ -6,24 +6,21 @@ import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 import trimesh
 from PIL import Image
 from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from asset_pipeline.sources.files import archives
+from asset_pipeline.sources.files.near_files import NearFiles, colour_beside
 from asset_pipeline.sources.files.ply_rows import check_rows
-from asset_pipeline.sources.files.wavefront_lines import read_lines
+from asset_pipeline.sources.files.wavefront_lines import read_lines, without_mark
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
 
-# Of the formats that trimesh reads, those of surfaces.
-MESHES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae", ".off", ".3mf")
-IMAGES = (".png", ".jpg", ".jpeg")
-_BESIDE = (*IMAGES, ".mtl", ".bin", ".webp", ".bmp", ".tga", ".tif", ".tiff")
 # Names that say nothing about the object: the folder's does.
 ANONYMOUS = ("model", "mesh", "object", "scan", "scene", "textured", "texture", "untitled")
 METRES = {
@@ -31,6 +28,8 @@ METRES = {
     "millimeters": 1e-3, "millimeter": 1e-3, "mm": 1e-3, "inches": 0.0254, "inch": 0.0254, "in": 0.0254,
     "feet": 0.3048, "foot": 0.3048, "ft": 0.3048,
 }  # fmt: skip
+COMPRESSIONS = {b"KHR_draco_mesh_compression": "Draco", b"EXT_meshopt_compression": "meshopt"}
+LEAST_OPACITY = 0.15
 GREY = (0.7, 0.7, 0.7, 1.0)
 
 
@@ -56,55 +55,70 @@ class MeshFile:
 def read_mesh_file(path: Path) -> MeshFile:
     """Read a file; its texture also where no material names it: an image of the mesh's name, or the only one.
 
+    Textures that it names and that are not there give a warning.
+
     Raises:
-      InputError: It cannot be read, or holds no surface.
+      InputError: It cannot be read, names a buffer that is not there or an image that cannot be read, or holds no
+        surface.
     """
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(f"{path}: is empty; expected a mesh")
     if path.suffix.lower() == ".obj":
         if defects := read_lines(path, max_bytes=archives.MAX_FILE_BYTES).defects:
             log.warning("%s: %s", path, "; ".join(defects))
     elif path.suffix.lower() == ".ply":
         check_rows(path)
+    elif path.suffix.lower() in (".glb", ".gltf"):
+        _check_compression(path)
+    near = NearFiles(path)
     try:
-        loaded = trimesh.load(
-            path, process=False
-        )  # opens what the file names in its own folder only
-        unit = _metres(str(loaded.units).lower())
+        with without_mark(path) as source:
+            loaded = trimesh.load(
+                source, file_type=path.suffix[1:].lower(), resolver=near, process=False
+            )
         mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:  # each of trimesh's readers fails in its own way
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{path}: cannot be read as a mesh ({reason})") from None
+        log.info("%s: %s: %s", path, type(error).__name__, error)
+        raise InputError(f"{path}: {_reason(path, near)}") from None
+    for image, reason in near.unreadable:
+        raise InputError(f"{image}: cannot be read as an image ({reason})")
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise InputError(f"{path}: holds no faces; expected a triangle surface")
+        hint = "; is it cut off, or something else?" if path.suffix.lower() == ".stl" else ""
+        raise InputError(f"{path}: holds no faces; expected a triangle surface{hint}")
     uv = getattr(mesh.visual, "uv", None)
-    image = None if uv is None else _image(mesh, path)
+    image, beside = (None, None) if uv is None else _image(mesh, path)
+    if lacks := near.lacks():
+        log.warning("%s: %s; built with%s", path, lacks, f" {beside.name}" if beside else "out")
     bare = trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), process=False)
     if image is not None:
         bare.visual = TextureVisuals(uv=np.nan_to_num(np.asarray(uv, float)))
-    else:
+    elif np.isfinite(bare.vertices).all():  # else it is refused later
         bare.merge_vertices()  # STL has three of its own for every face
+    unit = _metres(str(loaded.units).lower()) if _states_unit(path) else None
     return MeshFile(bare, image, _colour(mesh), unit, _stated_up(path))
 
 
-def companions(path: Path) -> list[Path]:
-    """The files beside a mesh, or one folder below, that it or its material library names, sorted."""
-    near = [
-        file
-        for pattern in ("*", "*/*")
-        for file in path.parent.glob(pattern)
-        if file.suffix.lower() in _BESIDE and file.is_file()
-    ]
-    found: set[Path] = set()
-    texts = [path.read_bytes()]
-    while texts:
-        text = texts.pop()
-        for file in near:
-            names = {file.name.encode(), quote(file.name).encode()}
-            if file not in found and any(name in text for name in names):
-                found.add(file)
-                texts += [file.read_bytes()] if file.suffix.lower() == ".mtl" else []
-    if not any(file.suffix.lower() in IMAGES for file in found) and (image := _beside(path)):
-        found.add(image)
-    return sorted(found)
+def _reason(path: Path, near: NearFiles) -> str:
+    """Why a reader failed, as far as a person can do something about it."""
+    if lacks := near.lacks():
+        return f"{lacks}; expected it beside the mesh"
+    name = path.suffix[1:].upper()
+    return f"cannot be read as {name}; is it cut off, or something else? Export it again"
+
+
+def _check_compression(path: Path) -> None:
+    """Of a compressed glTF trimesh reads zeros."""
+    required = re.search(rb'"extensionsRequired"\s*:\s*\[([^\]]*)\]', path.read_bytes())
+    for extension, what in COMPRESSIONS.items():
+        if required and extension in required[1]:
+            raise InputError(
+                f"{path}: is compressed by {what}, which is not read; export it without compression"
+            )
+
+
+def _states_unit(path: Path) -> bool:
+    """COLLADA files without a unit are said to be in metres, which nobody who left it out has thought of."""
+    return path.suffix.lower() != ".dae" or re.search(rb"<unit\b", path.read_bytes()) is not None
 
 
 def _metres(text: str) -> float | None:
@@ -126,37 +140,35 @@ def _stated_up(path: Path) -> str | None:
     return stated.group(1).decode().lower() if stated else "y"
 
 
-def _image(mesh: trimesh.Trimesh, path: Path) -> Image.Image | None:
+def _image(mesh: trimesh.Trimesh, path: Path) -> tuple[Image.Image | None, Path | None]:
+    """What colours the surface, and the file where no material names it."""
     material = getattr(mesh.visual, "material", None)
     found = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
-    # To an OBJ without a material trimesh gives a plain one of 2 x 2 pixels.
-    if isinstance(found, Image.Image) and (path.suffix.lower() != ".obj" or max(found.size) > 2):
-        return found
-    beside = _beside(path)
+    if isinstance(found, Image.Image) and not _is_placeholder(found, path):
+        return found, None
+    beside = colour_beside(path)
     if beside is None:
-        return None
+        return None, None
     try:
         with Image.open(beside) as image:
-            return image.convert("RGB")
+            return image.convert("RGB"), beside
     except Exception as error:  # each of Pillow's readers fails in its own way
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(f"{beside}: cannot be read as an image ({reason})") from None
 
 
-def _beside(path: Path) -> Path | None:
-    """The image of the mesh's own name, or the only one where the mesh is the only one too."""
-    files = [f for f in sorted(path.parent.iterdir()) if f.is_file()]
-    images = [f for f in files if f.suffix.lower() in IMAGES]
-    named = [f for f in images if f.stem == path.stem]
-    alone = len(images) == 1 and sum(f.suffix.lower() in MESHES for f in files) == 1
-    return (named or (images if alone else [None]))[0]
+def _is_placeholder(image: Image.Image, path: Path) -> bool:
+    """To an OBJ without a material trimesh gives a plain one of 2 x 2 pixels; those of a library say where from."""
+    return path.suffix.lower() == ".obj" and max(image.size) <= 2 and "file_path" not in image.info
 
 
 def _colour(mesh: trimesh.Trimesh) -> tuple[float, float, float, float]:
-    """The material's or the vertices' main colour; grey where the file states none."""
+    """The material's or the vertices' main colour; grey where the file states none. Never invisible."""
     visual = mesh.visual
     source = getattr(visual, "material", visual)
     if source is visual and getattr(visual, "kind", None) not in ("vertex", "face"):
         return GREY
     r, g, b, a = (np.asarray(getattr(source, "main_color"), float) / 255).tolist()  # noqa: B009
-    return r, g, b, a
+    # glTF: what is not said to blend is opaque, whatever its alpha.
+    opaque = isinstance(source, PBRMaterial) and source.alphaMode not in ("BLEND", "MASK")
+    return r, g, b, 1.0 if opaque else max(a, LEAST_OPACITY)

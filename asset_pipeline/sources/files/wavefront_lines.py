@@ -7,10 +7,14 @@ all of it holds for published files was checked on 24 YCB, 8 Google and 458 Part
 
 from __future__ import annotations
 
+import io
 import re
 from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -28,6 +32,9 @@ KEYWORDS = frozenset({
 NAMES = ("vertex", "texture coordinate", "normal")
 _PLURAL = ("vertices", "texture coordinates", "normals")
 STATED = {"vertices": 0, "faces": 1}  # `# Vertices: 8006`, as Katamari's and MeshLab's files begin
+
+
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # opens what some editors save
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ def read_lines(path: Path, *, max_bytes: int) -> WavefrontLines:
 
 
 def read_text(path: Path, *, max_bytes: int) -> str:
-    """A text file of a stranger.
+    """A text file of a stranger, without a byte order mark.
 
     Raises:
       InputError: Missing or too large.
@@ -85,9 +92,20 @@ def read_text(path: Path, *, max_bytes: int) -> str:
     try:
         if path.stat().st_size > max_bytes:
             raise InputError(f"{path}: larger than {max_bytes >> 20} MiB; expected a mesh")
-        return path.read_bytes().decode("utf-8", errors="replace")
+        return path.read_bytes().decode("utf-8-sig", errors="replace")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+@contextmanager
+def without_mark(path: Path) -> Iterator[BinaryIO]:
+    """A file, open behind its byte order mark, which would hide the first line from a reader."""
+    with path.open("rb") as file:
+        if file.read(len(BYTE_ORDER_MARK)) != BYTE_ORDER_MARK:
+            file.seek(0)
+            yield file
+        else:
+            yield io.BytesIO(file.read())
 
 
 def numbers(text: str, least: int, what: str) -> list[float]:
