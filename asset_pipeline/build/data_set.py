@@ -32,6 +32,7 @@ from asset_pipeline.sources.scan import Scan, ScanItem, write_texture
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.assets.geometry import Body, MassProperties, Shape
+from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError, unknown_name
 
 log = logging.getLogger(__name__)
@@ -94,8 +95,6 @@ def build(
         raise unknown_name("source", source, SOURCES)
     if source == OWN:
         said = said or MeshOptions()
-        for remark in said.remarks():
-            log.warning("%s: %s", path, remark)
     elif said is not None:
         raise InputError(f"{source} knows its objects; options are for the source {OWN!r} only")
     # Objects are built in processes with other working directories.
@@ -104,6 +103,8 @@ def build(
     for name in only:
         if name not in found:
             raise unknown_name(f"object in {path}", name, found)
+    for remark in said.remarks() if said is not None else ():
+        log.warning("%s: %s", path, remark)
     require_writable(out)
     overrides = _overrides(labels, out, found)
     return run_jobs(
@@ -151,8 +152,18 @@ def build_item(
             if isinstance(item, MeshItem):
                 where = {PLACE: place(item.file, folder)}
                 provenance = replace(provenance, inputs=provenance.inputs | where)
-            build_scan(replace(scan, provenance=provenance), target, override)
+            asset = build_scan(replace(scan, provenance=provenance), target, override)
+            if isinstance(item, MeshItem) and override is None:
+                _tell_type(item.options.object_type, asset.label.object_type)
     return True
+
+
+def _tell_type(said: ObjectType | None, found: ObjectType) -> None:
+    """A vessel with a handle has no axis that all of it is round about, whatever is said."""
+    if said not in (None, found):
+        log.warning(
+            "--type %s does not fit what sticks out at its side; labelled as %s", said, found
+        )
 
 
 def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> Asset:
@@ -278,4 +289,6 @@ def _items(source: str, path: Path, limits: Limits, said: MeshOptions | None) ->
         raise InputError(f"{path}: cannot be listed ({outcome.error})")
     if outcome.error is not None:
         raise outcome.error
+    for warning in outcome.warnings:
+        log.warning("%s", warning)
     return outcome.value

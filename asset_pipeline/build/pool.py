@@ -156,4 +156,5 @@ def _named(job: BuildJob, message: str) -> str:
         re.escape(f"{job.folder.parent}/{PREFIX}{job.folder.name}-") + r"\w+(/[\w-]+/unpacked)?"
     )
     line = " ".join(re.sub(passing, lambda _: job.where, message).split())
+    line = line.removeprefix(f"{job.name}: ")  # which stands before it anyway
     return line if job.where in line else f"{job.where}: {line}"

@@ -197,9 +197,10 @@ def kind_of(name: str) -> Kind:
       name: The source's name, in whatever case, with spaces, hyphens or underscores.
 
     Returns:
-      Our category, or the source's own in our spelling; and its type.
+      Our category, or the source's own in our spelling (letters of any script, digits, underscores; empty where
+      the name has neither letter nor digit); and its type.
     """
-    own = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    own = re.sub(r"[\W_]+", "_", name.lower()).strip("_")
     category = SYNONYMS.get(own, own)
     if category in CATALOGUE:
         return Kind(category, CATALOGUE[category].object_type)

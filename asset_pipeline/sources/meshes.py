@@ -248,21 +248,18 @@ def _meshes_in(folder: Path) -> list[Path]:
         folders[:] = sorted(name for name in folders if not is_hidden(name))
         files = (Path(place, name).relative_to(folder) for name in sorted(names))
         deep += [file for file in files if len(file.parts) > 2 and _is_shown_mesh(file)]
-    for left, what in (
-        (deep, "lie more than one folder down; name their folder as PATH to build them"),
-        (broken, "are links that lead nowhere"),
-    ):
-        if left:
-            first = left[0] if left is deep else left[0].relative_to(folder)
-            log.warning(
-                "%s: left out %d meshes, which %s: %s%s",
-                folder,
-                len(left),
-                what,
-                first,
-                "" if len(left) == 1 else " and others",
-            )
+    broken = [file.relative_to(folder) for file in broken]
+    _tell_left_out(folder, broken, "a link that leads", "links that lead", "nowhere")
+    where = "more than one folder down (to build it, name its folder as PATH)"
+    _tell_left_out(folder, deep, "which lies", "which lie", where)
     return found
+
+
+def _tell_left_out(folder: Path, files: list[Path], one: str, several: str, why: str) -> None:
+    if files:
+        what = f"1 mesh, {one}" if len(files) == 1 else f"{len(files)} meshes, {several}"
+        more = " and others" if len(files) > 1 else ""
+        log.warning("%s: left out %s %s: %s%s", folder, what, why, files[0], more)
 
 
 def _is_shown_mesh(file: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import signal
 import subprocess
@@ -160,6 +161,16 @@ def test_what_fails_leaves_nothing_and_says_why_in_one_line(tmp_path, kind):
     assert result.status == "failed"
     assert result.reason == f"{name}something in here.obj/thing is wrong"
     assert not list(tmp_path.iterdir())
+
+
+def _warns(folder: Path, target: Path) -> bool:
+    logging.getLogger(__name__).warning("thing: its texture is not there")
+    return False
+
+
+def test_a_warning_names_the_object_once(tmp_path, caplog):
+    run_jobs([BuildJob("thing", tmp_path / "thing", "here.obj", _warns, (), Limits())])
+    assert [r.getMessage() for r in caplog.records] == ["thing: here.obj: its texture is not there"]
 
 
 def test_catalogue_builds_skips_and_survives_a_generator_that_fails(tmp_path, monkeypatch):
