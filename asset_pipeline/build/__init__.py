@@ -6,7 +6,8 @@
 
 `data_set` builds what a source holds; `rigid` and `articulated` give one object what it lacks (stable poses and
 grasps; joints, handles and cavities) with `steady_body`, `grasp_trial`, `link_shapes` and `link_visuals`; `emit` writes the folder;
-`pool` runs many at once, each in a process of `workers/` with limits; `relabel` corrects labels afterwards.
+`pool` runs many at once, each in a process of `workers/` with limits; `replaceable` keeps it from removing what is
+no asset; `relabel` corrects labels afterwards.
 """
 
 from __future__ import annotations

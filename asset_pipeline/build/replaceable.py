@@ -14,7 +14,7 @@ from manipose_mj.errors import InputError
 
 # Folders and files are named for it, with up to 30 characters more; file systems take 255 bytes.
 MOST_BYTES = 200
-# In an asset's inputs: a digest of where the file lies, from the folder of assets. Moved together, they stay up to date.
+# In an asset's inputs: a digest of where the file lies, seen from the folder of assets, so that both may move together.
 PLACE = "place"
 
 
