@@ -212,7 +212,8 @@ class Baseline:
                 elif not (step_by_step and plan):
                     self.status = "done"
                     yield from executor.wait(_AT_END)
-                    if step_by_step or not self._falls_short(executor):
+                    ends = step_by_step or not self._planner.follows_goals
+                    if ends or not self._falls_short(executor):
                         yield from executor.wait(_TO_REST if scene.perception.feels_joints else 0.0)
                         return
                     falls_short = True

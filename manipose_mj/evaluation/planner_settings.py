@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from manipose_mj.errors import InputError
 
 if TYPE_CHECKING:
+    from manipose_mj.control.language.exchanges import ChatModel
     from manipose_mj.control.planning.planner import TaskPlanner
 
 PlannerKind = Literal["rules", "llm", "replay"]
@@ -50,6 +51,9 @@ class PlannerSettings:
             )
         if self.kind != "llm" and self.base_url is not None:
             raise InputError("base url: only --planner llm has an endpoint")
+        for name, text in (("model", self.model), ("instruction", self.instruction)):
+            if text is not None and not (text.strip() and _writable(text)):
+                raise InputError(f"{name}: {text!r}; expected words")
         if self.replay is not None and not self.replay.exists():
             raise InputError(f"{self.replay}: no such file or folder of recorded exchanges")
 
@@ -60,18 +64,27 @@ class PlannerSettings:
           InputError: The endpoint's client or key is missing, or the recorded answers cannot be read.
         """
         # Loads the simulator: workers only.
-        from manipose_mj.control.language.endpoint import EndpointModel
-        from manipose_mj.control.language.exchanges import ReplayModel
         from manipose_mj.control.language.planner import LanguagePlanner
         from manipose_mj.control.planning.planner import RulePlanner
 
-        if self.kind == "rules":
+        model = self.language_model()
+        if model is None:
             return RulePlanner()
-        if self.replay is not None:
-            return LanguagePlanner(ReplayModel(self.replay), self.instruction)
-        assert self.model is not None
         record = None if self.record is None else self.record / f"{os.getpid()}.jsonl"
-        return LanguagePlanner(EndpointModel(self.model, self.base_url), self.instruction, record)
+        return LanguagePlanner(model, self.instruction, record)
+
+    def language_model(self) -> ChatModel | None:
+        """What is asked for plans; None for the planner by rules. It loads no simulator.
+
+        Raises:
+          InputError: As of `make`.
+        """
+        from manipose_mj.control.language.endpoint import EndpointModel
+        from manipose_mj.control.language.exchanges import ReplayModel
+
+        if self.replay is not None:
+            return ReplayModel(self.replay)
+        return None if self.model is None else EndpointModel(self.model, self.base_url)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -89,16 +102,28 @@ class PlannerSettings:
 
     @property
     def words(self) -> list[str]:
-        """The options of the command line that say the same."""
+        """The options of the command line that say the same, but for a user, password or query in an address."""
         if self.kind == "rules":
             return []
+        # Loads nothing else.
+        from manipose_mj.control.language.endpoint import without_secrets
+
         words = ["--planner", self.kind]
         for name, value in (
             ("--model", self.model),
-            ("--base-url", self.base_url),
+            ("--base-url", None if self.base_url is None else without_secrets(self.base_url)),
             ("--replay", self.replay),
             ("--instruction", self.instruction),
         ):
             if value is not None:
                 words += [name, str(value)]
         return words
+
+
+def _writable(text: str) -> bool:
+    """Whether it can be written as UTF-8."""
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True

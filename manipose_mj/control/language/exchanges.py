@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict, deque
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -87,12 +88,16 @@ def read_exchanges(path: Path) -> list[Exchange]:
     """The records of a file, or of every `*.jsonl` in a folder.
 
     Raises:
-      InputError: There is no such file, or a line is no record.
+      InputError: There is no such file, it has no records, or a line is none.
     """
-    files = sorted(path.glob("*.jsonl")) if path.is_dir() else [path]
-    if not files:
-        raise InputError(f"{path}: holds no *.jsonl with recorded exchanges")
-    return [exchange for file in files for exchange in _records(file)]
+    # Named for processes: 9999 is before 10000.
+    numbered = sorted(path.glob("*.jsonl"), key=lambda file: (len(file.stem), file.stem))
+    exchanges = [
+        each for file in (numbered if path.is_dir() else [path]) for each in _records(file)
+    ]
+    if not exchanges:
+        raise InputError(f"{path}: holds no recorded exchange")
+    return exchanges
 
 
 def _records(path: Path) -> list[Exchange]:
@@ -103,14 +108,17 @@ def _records(path: Path) -> list[Exchange]:
     records = []
     for number, line in enumerate(lines, 1):
         try:
-            records.append(Exchange(**json.loads(line)))
-        except (ValueError, TypeError) as error:
+            record = Exchange(**json.loads(line))
+            if not isinstance(record.reply, str) or not isinstance(record.error, str):
+                raise TypeError("reply and error are text")
+            records.append(record)
+        except (ValueError, TypeError, RecursionError) as error:
             raise InputError(f"{path}, line {number}: no recorded exchange ({error})") from None
     return records
 
 
 class ReplayModel:
-    """Gives the recorded answer to each question, and none to any other."""
+    """Gives the recorded answers to each question, in their order, and none to any other."""
 
     def __init__(self, path: Path) -> None:
         """Reads the records.
@@ -119,19 +127,24 @@ class ReplayModel:
           InputError: They cannot be read.
         """
         exchanges = read_exchanges(path)
-        self.name = f"replay of {exchanges[0].model}" if exchanges else "replay"
+        self.name = f"replay of {exchanges[0].model}"
         self.parameters: dict[str, Any] = {"replay": path.name}
-        self._answers = {each.question: each for each in exchanges}
+        self._answers: dict[str, deque[Exchange]] = defaultdict(deque)
+        for each in exchanges:
+            self._answers[each.question].append(each)
 
     def answer(self, messages: list[Message], schema: dict[str, Any]) -> str:
-        """The recorded reply.
+        """The recorded reply; to a question that was asked several times, one after the other, then the last.
 
         Raises:
           NoReplyError: The question was not recorded, or had no reply then either.
         """
-        found = self._answers.get(question(messages, schema))
-        if found is None:
-            raise NoReplyError("this question is not among the recorded ones")
+        answers = self._answers.get(question(messages, schema))
+        if not answers:
+            raise NoReplyError(
+                "this question is not among the recorded ones; an own --instruction has to be given again"
+            )
+        found = answers.popleft() if len(answers) > 1 else answers[0]
         if found.error:
             raise NoReplyError(found.error)
         return found.reply

@@ -53,6 +53,11 @@ class LanguagePlanner:
         self._model, self._instruction, self._record = model, instruction, record
         self._asked_for = instruction or ""
 
+    @property
+    def follows_goals(self) -> bool:
+        """Whether it plans what the episode asks for."""
+        return self._instruction is None
+
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
         self._asked_for = self._instruction or instruction

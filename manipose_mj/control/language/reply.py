@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,12 +11,16 @@ from typing import Any
 from manipose_mj.control.language.destinations import Destination
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.check import PlanState
-from manipose_mj.control.planning.plan import Plan, Step, plan_from_json, plan_schema
+from manipose_mj.control.planning.plan import Plan, Step, plan_from_json, plan_schema, shortened
 from manipose_mj.control.planning.regrasp import Poses, routes
 from manipose_mj.control.planning.transport import place_at_each
 from manipose_mj.control.scene.articulation import with_part_at
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
+
+_LONGEST = 200  # characters of a reason
+_MOST_STARTS = 50  # of objects that are looked for in a reply
+_THOUGHT = "</think>"
 
 
 class RefusedError(Exception):
@@ -66,19 +71,18 @@ def read_reply(
       InputError: The reply is not of the schema, names something that is not there, or its steps do not find
         what they need; one line.
     """
-    try:
-        reply = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(f"reply: not valid JSON ({error})") from None
-    if not isinstance(reply, dict) or set(reply) != {"plan", "refusal"}:
+    reply = _json_in(text)
+    if not isinstance(reply, dict) or not {"plan"} <= set(reply) <= {"plan", "refusal"}:
         raise InputError('reply: expected an object with the fields "plan" and "refusal"')
-    entries, refusal = reply["plan"], reply["refusal"]
+    entries, refusal = reply["plan"], reply.get("refusal")
+    refusal = "" if refusal is None else refusal
     if not isinstance(entries, list) or not isinstance(refusal, str):
         raise InputError('reply: "plan" is a list of steps, "refusal" is text')
-    if refusal:
+    if refusal.strip():
         if entries:
             raise InputError("reply: a plan and a refusal; expected one of them")
-        raise RefusedError(" ".join(refusal.split()))
+        whole = refusal.encode("utf-8", "replace").decode("utf-8")
+        raise RefusedError(" ".join(whole.split())[:_LONGEST])
     state = PlanState(estimate)
     steps = tuple(
         _step(entry, f"plan[{i}]", estimate, destinations, state) for i, entry in enumerate(entries)
@@ -88,6 +92,30 @@ def read_reply(
     return steps
 
 
+def _json_in(text: str) -> Any:
+    """What a reply holds: JSON alone, or in a fence, after a thought or among prose.
+
+    Raises:
+      InputError: There is no JSON.
+    """
+    text = text.rpartition(_THOUGHT)[2].strip().removeprefix("\ufeff")
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        mistake = str(error)[:_LONGEST]
+    decoder = json.JSONDecoder()
+    for start, _ in zip(re.finditer("{", text), range(_MOST_STARTS), strict=False):
+        try:
+            found, _ = decoder.raw_decode(text, start.start())
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(found, dict) and "plan" in found:
+            return found
+    raise InputError(
+        f"reply: not valid JSON ({mistake}); answer with the JSON object only, without fences or other text"
+    )
+
+
 def _step(
     entry: Any,
     where: str,
@@ -95,6 +123,8 @@ def _step(
     destinations: Mapping[str, Destination],
     state: PlanState,
 ) -> Step | NamedMove:
+    if isinstance(entry, dict) and "poses" in entry:
+        raise InputError(f"{where}: no field 'poses'; a move of an object names its 'destination'")
     if not isinstance(entry, dict) or "destination" not in entry:
         subjects = {*estimate.objects, *estimate.parts}
         try:
@@ -106,13 +136,15 @@ def _step(
     if set(entry) != {"primitive", "subject", "destination"} or entry["primitive"] != "move_to":
         raise InputError(f"{where}: only move_to has a 'destination', and nothing else beside it")
     subject, name = entry["subject"], entry["destination"]
-    if subject not in estimate.objects:
+    if not isinstance(subject, str) or subject not in estimate.objects:
         known = ", ".join(sorted(estimate.objects)) or "none, the scene has no objects"
-        raise InputError(f"{where}: field 'subject' is {subject!r}; expected an object: {known}")
+        raise InputError(
+            f"{where}: field 'subject' is {shortened(subject)}; expected an object: {known}"
+        )
     place = destinations.get(name) if isinstance(name, str) else None
     if place is None:
         raise InputError(
-            f"{where}: field 'destination' is {name!r}; expected one of {', '.join(sorted(destinations))}"
+            f"{where}: field 'destination' is {shortened(name)}; expected one of {', '.join(sorted(destinations))}"
         )
     if place.only_for not in (None, subject):
         raise InputError(f"{where}: {name!r} is for {place.only_for}, not for {subject}")

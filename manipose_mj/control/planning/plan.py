@@ -15,6 +15,7 @@ from manipose_mj.poses import pose_to_vector, vector_to_pose
 
 Primitive = Literal["move_to", "grasp_at", "release"]
 
+_LONGEST = 200  # characters of a value in a message
 _FIELDS: dict[str, Any] = {
     "poses": {
         "description": "where the object's label may end, any of them will do",
@@ -46,7 +47,7 @@ def plan_schema(subjects: Iterable[str] = ()) -> dict[str, Any]:
         subject["enum"] = names
 
     def step(primitives: list[str], *fields: str) -> dict[str, Any]:
-        properties = {"primitive": {"enum": primitives}, "subject": subject}
+        properties = {"primitive": {"type": "string", "enum": primitives}, "subject": subject}
         properties |= {field: _FIELDS[field] for field in fields}
         return {
             "type": "object",
@@ -130,11 +131,17 @@ def plan_from_json(text: str, subjects: set[str]) -> Plan:
     """
     try:
         entries = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"plan: not valid JSON ({error})") from None
     if not isinstance(entries, list):
         raise InputError(f"plan: a {type(entries).__name__}; expected a list of steps")
     return tuple(_step(entry, f"plan[{i}]", subjects) for i, entry in enumerate(entries))
+
+
+def shortened(value: Any) -> str:
+    """A value as one line that is not too long to be told."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def _step(entry: Any, where: str, subjects: set[str]) -> Step:
@@ -142,15 +149,15 @@ def _step(entry: Any, where: str, subjects: set[str]) -> Step:
         raise InputError(f"{where}: a {type(entry).__name__}; expected an object")
     extra = set(entry) - {"primitive", "subject", "poses", "opening"}
     if extra:
-        raise InputError(f"{where}: unknown field {sorted(extra)[0]!r}")
+        raise InputError(f"{where}: unknown field {shortened(sorted(extra)[0])}")
     primitive, subject = entry.get("primitive"), entry.get("subject")
     if primitive not in ("move_to", "grasp_at", "release"):
         raise InputError(
-            f"{where}: field 'primitive' is {primitive!r}; expected move_to, grasp_at or release"
+            f"{where}: field 'primitive' is {shortened(primitive)}; expected move_to, grasp_at or release"
         )
     if not isinstance(subject, str) or subject not in subjects:
         raise InputError(
-            f"{where}: field 'subject' is {subject!r}; expected one of {', '.join(sorted(subjects))}"
+            f"{where}: field 'subject' is {shortened(subject)}; expected one of {', '.join(sorted(subjects))}"
         )
     poses, opening = entry.get("poses"), entry.get("opening")
     if (primitive == "move_to") != ((poses is None) != (opening is None)):
@@ -160,7 +167,9 @@ def _step(entry: Any, where: str, subjects: set[str]) -> Step:
             raise InputError(f"{where}: field 'poses' is not a list of poses")
         return Step(primitive, subject, poses=tuple(_pose(p, where) for p in poses))
     if opening is not None and not _numbers([opening], 1):
-        raise InputError(f"{where}: field 'opening' is {opening!r}; expected a number [m or rad]")
+        raise InputError(
+            f"{where}: field 'opening' is {shortened(opening)}; expected a number [m or rad]"
+        )
     return Step(primitive, subject, opening=None if opening is None else float(opening))
 
 

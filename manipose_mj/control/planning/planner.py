@@ -21,7 +21,16 @@ from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
 
 
 class TaskPlanner(Protocol):
-    """From goals and an estimate of the scene to plans, whoever makes them."""
+    """From goals and an estimate of the scene to plans, whoever makes them.
+
+    Attributes:
+      follows_goals: Whether plans are for the task's goals, and others are asked for until these are met.
+    """
+
+    @property
+    def follows_goals(self) -> bool:
+        """As above."""
+        ...
 
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
@@ -49,6 +58,8 @@ class TaskPlanner(Protocol):
 
 class RulePlanner:
     """Plans by the rules of this module."""
+
+    follows_goals = True
 
     def begin(self, instruction: str) -> None:
         """Goals say all that rules need."""

@@ -98,7 +98,7 @@ def write_report(out: Path, *, jobs: int = 1, scene: Scene = simulated) -> Path:
         no_gl="" if gl.working_backend() else gl.why_not(),
     )
     path = out / REPORT_FILE
-    write_atomically(path, html.encode("utf-8"))
+    write_atomically(path, html.encode("utf-8", "replace"))
     return path
 
 

@@ -153,3 +153,108 @@ def test_the_default_endpoint_needs_a_key(monkeypatch):
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     with pytest.raises(InputError, match=f"set {KEY_VARIABLE}, or give --base-url"):
         EndpointModel("m")
+
+
+def refuses(parameter: str, message: str = ""):
+    """Answers as an endpoint that does not take a parameter."""
+    words = message or f"Unsupported value: '{parameter}' does not support this"
+    body = json.dumps({"error": {"message": words, "param": parameter, "code": "unsupported"}})
+    return lambda handler: send(handler, 400, body)
+
+
+@pytest.mark.parametrize(
+    ("refusals", "left"),
+    [
+        ([refuses("temperature")], {"seed": 0, "response_format": "json_schema"}),
+        ([refuses("seed")], {"temperature": 0.0, "response_format": "json_schema"}),
+        ([refuses("response_format")], {"temperature": 0.0, "seed": 0, "response_format": "json_object"}),
+        (
+            [refuses("", "This response_format type is unavailable now"), refuses("response_format"), refuses("seed")],
+            {"temperature": 0.0},
+        ),
+    ],
+    ids=["temperature", "seed", "schema", "one after the other"],
+)  # fmt: skip
+def test_what_an_endpoint_does_not_take_is_left_out(serve, tmp_path, refusals, left):
+    server = serve(*refusals, says(GOOD), says(GOOD))
+    ask, path = asked(server, tmp_path)
+    assert len(ask()) == 3 and len(ask()) == 3
+    assert len(server.requests) == len(refusals) + 2  # later questions do without it at once
+    last = server.requests[-1]
+    assert ("temperature" in last, "seed" in last) == ("temperature" in left, "seed" in left)
+    assert last.get("response_format", {}).get("type") == left.get("response_format")
+    assert [each.parameters for each in read_exchanges(path)][-1] == left
+
+
+def test_a_refusal_of_something_else_is_told_with_its_reason(serve, tmp_path):
+    ask, _ = asked(serve(refuses("model", f"no model m for key {KEY}")), tmp_path)
+    with pytest.raises(InputError, match=r"status 400: .*no model m for key \*\*\*"):
+        ask()
+
+
+def raw(body: str, kind: str = "application/json"):
+    return lambda handler: send(handler, 200, body)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "",
+        '{"choices": [',
+        '{"choices": {}}',
+        '{"choices": [null]}',
+        '{"choices": [{"message": null}]}',
+        '{"choices": [{"text": "legacy"}]}',
+        '{"error": {"message": "overloaded"}}',
+        "[" * 100_000,
+    ],
+    ids=lambda body: body[:30] or "empty",
+)
+def test_an_answer_that_is_none_is_one_line_and_on_record(serve, tmp_path, body):
+    ask, path = asked(serve(*[raw(body)] * (1 + MAX_REPAIRS)), tmp_path)
+    with pytest.raises(InputError, match="the language model") as caught:
+        ask()
+    assert "\n" not in str(caught.value)
+    assert read_exchanges(path)
+
+
+def test_an_answer_in_parts_is_joined_and_holds_no_key(serve, tmp_path):
+    half = len(GOOD) // 2
+    parts = [{"type": "text", "text": text} for text in (GOOD[:half], GOOD[half:])]
+    ask, _ = asked(serve(says(parts)), tmp_path)
+    assert len(ask()) == 3
+    declines = json.dumps({"plan": [], "refusal": f"bad key {KEY} \ud83d"})
+    ask, path = asked(serve(says(declines)), tmp_path / "other")
+    with pytest.raises(InputError, match=r"declines: bad key \*\*\* \?") as caught:
+        ask()
+    str(caught.value).encode("utf-8")
+    assert KEY not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "address", ["localhost:8000/v1", "http://localhost:abc/v1", "http://[::1/v1", "ftp://h/v1", ""]
+)
+def test_an_address_that_is_none_is_told_at_once(address):
+    with pytest.raises(InputError, match="expected an address such as http://localhost:8000/v1"):
+        EndpointModel("m", address)
+
+
+@pytest.mark.parametrize("key", ["sk-schl\u00fcssel", "sk\x07bell"])
+def test_a_key_that_is_none_is_told_at_once(monkeypatch, key):
+    monkeypatch.setenv(KEY_VARIABLE, key)
+    with pytest.raises(InputError, match=f"{KEY_VARIABLE}: holds characters"):
+        EndpointModel("m", "http://localhost:1/v1")
+
+
+def test_a_keys_spaces_do_not_count(serve, tmp_path, monkeypatch):
+    server = serve(says(GOOD))
+    monkeypatch.setenv(KEY_VARIABLE, f" {KEY}\n")
+    ask, _ = asked(server, tmp_path)
+    assert len(ask()) == 3
+
+
+def test_an_address_is_on_record_without_secrets():
+    from manipose_mj.control.language.endpoint import without_secrets
+
+    assert without_secrets("http://me:pw@host:1/v1?api-key=s") == "http://host:1/v1"
+    assert without_secrets("https://api.openai.com/v1") == "https://api.openai.com/v1"

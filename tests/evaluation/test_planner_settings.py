@@ -1,0 +1,39 @@
+"""What says which planner makes plans: mistakes in it are told before anything runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.planner_settings import PlannerSettings
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"kind": "llm", "model": " "}, "model: ' '; expected words"),
+        ({"kind": "llm", "model": "m", "instruction": ""}, "instruction: ''; expected words"),
+        ({"kind": "llm", "model": "m", "instruction": "open \udcff"}, "instruction: .* expected words"),
+        ({"kind": "llm"}, "--planner llm needs one"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_line(given, words):
+    with pytest.raises(InputError, match=words) as caught:
+        PlannerSettings(**given)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_address_that_is_none_is_told_before_a_planner_is_made():
+    with pytest.raises(InputError, match="expected an address"):
+        PlannerSettings("llm", "m", "localhost:8000").language_model()
+
+
+def test_an_empty_file_of_records_is_told_before_a_planner_is_made(tmp_path):
+    (tmp_path / "none.jsonl").touch()
+    with pytest.raises(InputError, match="holds no recorded exchange"):
+        PlannerSettings("replay", replay=tmp_path / "none.jsonl").language_model()
+
+
+def test_words_hold_no_secrets():
+    words = PlannerSettings("llm", "m", "http://me:pw@host:1/v1?api-key=s").words
+    assert words[words.index("--base-url") + 1] == "http://host:1/v1"
