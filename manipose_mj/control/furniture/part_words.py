@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipose_mj.assets.asset import MovingPart
+from manipose_mj.control.furniture.door_hinge import WITH_KNOBS
 from manipose_mj.tasks.articulated.part_choice import kind_of, rows_of
 from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
 
@@ -21,6 +22,11 @@ _SHARE = 2.0  # how many places the whole height, or width, counts for
 # Of ovens: what it costs to be a knob, to slide, to be below, and to be short beside another bar, in places; handles
 # that are no shorter are bars [m].
 _KNOB, _SLIDES, _BELOW, _SHORT, _BAR = 1.5, 0.3, 1.0, 1.5, 0.06
+
+_WIDE_BAR, _MUCH_SHORTER = (
+    0.3,
+    0.35,
+)  # a bar that is no row of knobs [m], and the share of it that knobs reach
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,10 @@ def meant_part(
       body: How low and how high it reaches, as the candidates' handles are told [m]. The middle one of a column is nearest
         to its middle, where others were missed.
     """
+    bars = _bars_of(candidates) if category in WITH_KNOBS else []
+    if bars and len(bars) < len(candidates):
+        index = meant_part(words, [candidates[i] for i in bars], category, body)
+        return None if index is None else bars[index]
     the_oven_door = category == "oven" and words == "door"
     for least in _LEAST[-1:] if the_oven_door else _LEAST:
         chosen = [i for i, candidate in enumerate(candidates) if candidate.confidence >= least]
@@ -69,6 +79,14 @@ def meant_part(
         if costs and (min(costs) < _FITS or least == _LEAST[-1]):
             return chosen[int(np.argmin(costs))]
     return None
+
+
+def _bars_of(candidates: Sequence[Candidate]) -> list[int]:
+    """Beside a wide bar, what is shorter by far is a knob, or a few in a row: indices of the others; none where no bar is wide."""
+    longest = max((candidate.length for candidate in candidates), default=0.0)
+    if longest < _WIDE_BAR:
+        return []
+    return [i for i, each in enumerate(candidates) if each.length > _MUCH_SHORTER * longest]
 
 
 def _cost(

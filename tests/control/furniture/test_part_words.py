@@ -94,3 +94,17 @@ def test_the_door_of_an_oven_is_above_a_drawer_and_below_its_knobs():
     assert meant_part("door", [row, below, bar], "oven") == 2
     # In a cupboard a wide, low front is a drawer's, wherever it is.
     assert meant_part("door", [below, above], "cabinet") == 0
+
+
+def test_beside_the_bars_of_two_oven_doors_knobs_are_no_doors():
+    left = Candidate(part("left", -0.4, 0.6, "hinge"), 0.12, 0.0, 0.3, 0.6)
+    right = Candidate(part("right", 0.4, 0.6, "hinge"), 0.3, 0.0, 0.3, 0.5)
+    knobs = [
+        Candidate(part(f"knob_{k}", k / 10, 0.7, "hinge"), 0.6, 0.5, 0.5, 0.08) for k in (1, 4)
+    ]
+    candidates = [*knobs, right, left]
+    assert meant_part("left door", candidates, "oven") == 3
+    assert meant_part("right door", candidates, "oven") == 2
+    assert meant_part("left door", knobs, "oven") == 0
+    # In a cupboard they are other doors' and drawers'.
+    assert meant_part("left door", candidates, "cabinet") != 3
