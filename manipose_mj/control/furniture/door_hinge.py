@@ -24,12 +24,6 @@ _CORNER = 0.6  # across: beyond it no flap has its handle
 # Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
 # of the handle, and a gap that ends it [m], wider than the shadow of a handle; points that tell.
 _FACE, _STRIP, _GAP, _TELLING = 0.04, 0.10, 0.15, 60
-# What is looked at beside a hinge, beyond it and within its panel, how far it may be off the plane behind the handle, and
-# how far behind the surface there hinges are [m], at most and at least; points that tell.
-_BESIDE, _CURVED, _BEHIND, _FEW = (0.01, 0.05), 0.06, (0.025, 0.005), 30
-_NEAR_TOP = (
-    0.4  # of the way between two bars, up to which they are at the upper edges of their panels
-)
 # Strips of a front this wide [m] are the panel's where points fill that share of them at least.
 _CELL, _SHARE = 0.02, 0.25
 
@@ -64,10 +58,9 @@ def can_be_a_door(
     if abs(axis[1]) > _STRAIGHT:
         width, height = np.ptp(panel[:, 1:], axis=0)
         return abs(float(_away(handle, panel)[1])) < _CORNER and bool(height < _TALL * width)
-    panel = one_of_two(handle, panel)
+    panel = _one_of_two(handle, panel)
     width = float(np.ptp(panel[:, 1]))
-    edge = float(panel[1 if origin[1] > handle[1, 3] else 0, 1])
-    at_edge = abs(edge - float(origin[1])) < _AT_EDGE * width
+    at_edge = float(np.abs(panel[:, 1] - origin[1]).min()) < _AT_EDGE * width
     return abs(float(axis[2])) > _STRAIGHT and at_edge
 
 
@@ -146,7 +139,7 @@ def likely_hinge(
     edge = abs(away[2]) > _UPRIGHT and half[2] < _TALL * half[1]
     level = along[1] > along[2] and abs(away[1]) < _ACROSS and (wide or edge)
     if not level:
-        panel = one_of_two(handle, panel)
+        panel = _one_of_two(handle, panel)
         away, middle, half = _away(handle, panel), panel.mean(axis=0), np.ptp(panel, axis=0) / 2
     across = 2 if level else 1
     side = -1.0 if away[across] > (-_UPRIGHT if level else 0.0) else 1.0
@@ -157,7 +150,7 @@ def likely_hinge(
     return origin, axis
 
 
-def one_of_two(
+def _one_of_two(
     handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
 ) -> Float[np.ndarray, "2 3"]:
     """The half of a panel that has the handle, where it is too wide for one upright door."""
@@ -174,58 +167,3 @@ def _away(
 ) -> Float[np.ndarray, "3"]:
     """From the panel's middle to the handle, in halves of the panel."""
     return (handle[:3, 3] - panel.mean(axis=0)) / np.maximum(np.ptp(panel, axis=0) / 2, 1e-3)
-
-
-def straightened(
-    origin: Float[np.ndarray, "3"],
-    axis: Float[np.ndarray, "3"],
-    handle: Float[np.ndarray, "4 4"],
-    front: float,
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """A hinge that seems to be askew, in the front and along the axis of the body that it is nearest to, through where it is nearest to the handle.
-
-    All in the object frame, as of `likely_hinge`; `front` is along X [m].
-    """
-    nearest = origin + ((handle[:3, 3] - origin) @ axis) * axis
-    nearest[0] = front
-    along = int(np.abs(axis).argmax())
-    return nearest, np.eye(3)[along] * np.sign(axis[along])
-
-
-def behind_surface(
-    origin: Float[np.ndarray, "3"],
-    axis: Float[np.ndarray, "3"],
-    handle: Float[np.ndarray, "4 4"],
-    points: Float[np.ndarray, "n 3"],
-    front: float,
-    panel: Float[np.ndarray, "2 3"],
-) -> float:
-    """Where along X a hinge is [m]: not far behind the surface beside it, which is not that at the handle where the front is curved.
-
-    All in the object frame, as of `whole_front`; a hinge beside which nothing shows stays where it is.
-    """
-    across = 2 if is_level(axis) else 1
-    other, side = 3 - across, np.sign(origin[across] - handle[across, 3])
-    within = side * (origin[across] - points[:, across])
-    near = (within > -_BESIDE[0]) & (within < _BESIDE[1])
-    near &= (points[:, other] > panel[0, other]) & (points[:, other] < panel[1, other])
-    near &= np.abs(points[:, 0] - front) < _CURVED
-    if near.sum() < _FEW:
-        return float(origin[0])
-    most, least = float(np.median(points[near, 0])) - np.array(_BEHIND)
-    return float(np.clip(origin[0], most, least))
-
-
-def border_of_bars(one: float, other: float, top: float) -> float:
-    """Where the panels of two wide bars, one above the other, meet [m].
-
-    Half-way; or, where the upper bar is near the top of its panel, as far above the lower one as that is.
-
-    Args:
-      one: How high a bar is [m].
-      other: The same of the other one.
-      top: Of the upper one's panel.
-    """
-    low, high = sorted((one, other))
-    above = top - high
-    return low + above if 0.0 < above < _NEAR_TOP * (high - low) else (low + high) / 2

@@ -12,13 +12,9 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.door_hinge import (
-    behind_surface,
-    border_of_bars,
     can_be_a_door,
     is_level,
     likely_hinge,
-    one_of_two,
-    straightened,
     whole_front,
 )
 from manipose_mj.control.furniture.object_frame import AJAR
@@ -37,7 +33,6 @@ _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 # How far a hinge is off an edge of its panel that is taken to be at it: at least, and within it at most [m].
 _OFF_EDGE, _INSIDE, _INSIDE_FLAP = 0.04, 0.10, 0.20
-_FLAP_INSET = 0.008  # how far within its edge a flap turns, at least [m]
 _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
@@ -216,13 +211,8 @@ class ShutPart:
             self.opening, self.back = 0.0, np.eye(4)
             length = 2 * float(self.half.max()) if self.measured else 0.0
             self.origin, self.axis = likely_hinge(self.handle, between, length)
-        elif front is not None:
-            if askew:
-                self.origin, self.axis = straightened(self.origin, self.axis, self.handle, front)
-            self._turn_about_edge(flat if is_level(self.axis) else one_of_two(self.handle, between))
-        if front is not None and self.kind == "hinge":
-            place = behind_surface(self.origin, self.axis, self.handle, facing, front, between)
-            self.origin[0] = place
+        elif front is not None and np.abs(self.axis).max() >= _SNAP:
+            self._turn_about_edge(flat if is_level(self.axis) else between)
 
     def _turn_about_edge(self, panel: Float[np.ndarray, "2 3"]) -> None:
         """Have the hinge at the edge of the panel that it is beyond, or not far within."""
@@ -234,8 +224,6 @@ class ShutPart:
         inside = _INSIDE_FLAP if across == 2 else _INSIDE
         if abs(beyond) > _OFF_EDGE and beyond > -inside:
             self.origin[across] = edge
-        if across == 2 and side * (self.origin[2] - edge) > -_FLAP_INSET:
-            self.origin[2] = edge - side * _FLAP_INSET
 
     def _is_in_a_row_with(self, other: ShutPart) -> bool:
         """Whether a sure drawer has a handle of the same size at the same height, and both show."""
@@ -391,8 +379,6 @@ def between_neighbours(
         if abs(away[axis]) < 0.05:
             continue
         middle = own[axis] + away[axis] / 2
-        if axis == 2 and part.is_bar and other.is_bar:
-            middle = border_of_bars(own[2], other.handle[2, 3], float(bounds[1, 2]))
         if away[axis] > 0:
             high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
         else:

@@ -9,11 +9,10 @@ SPARE_CAMERAS = ("overview",)  # used as well when the others leave an estimate 
 # Behind the robot and over its shoulders: they see the front of furniture, and what leaves an estimate uncertain. The
 # first is the highest.
 _LOOKED_AT = (0.72, 0.0, 0.15)
-_WIDE = 65.0  # 81 deg across: furniture may stand on one side of the robot, and its bars are up to 0.8 m long [deg]
 FRONT_VIEWS = (
-    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT, _WIDE),
-    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT, _WIDE),
-    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT, _WIDE),
+    CameraView("above", (-0.35, 0.0, 1.25), _LOOKED_AT),
+    CameraView("left_shoulder", (-0.05, 0.6, 0.75), _LOOKED_AT),
+    CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
 )
 FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
 HAND_CAMERA = "panda/wrist"  # looks where the hand is brought to look, nowhere else

@@ -5,16 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.door_hinge import (
-    behind_surface,
-    border_of_bars,
-    can_be_a_door,
-    likely_hinge,
-    straightened,
-    whole_front,
-)
+from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
-from manipose_mj.poses import compose, rotation_about
+from manipose_mj.poses import compose
 
 PANEL = np.array([[0.18, -0.3, 0.1], [0.20, 0.1, 0.6]])
 X, Y, Z = np.eye(3)
@@ -118,44 +111,3 @@ def test_what_is_too_wide_for_one_door_is_two(y, hinge):
     assert can_be_a_door(origin, axis, handle(y, 0.4), wide)
     far = np.array([0.2, -hinge or 0.5, 0.3])
     assert not can_be_a_door(far, axis, handle(-0.45, 0.4), wide)
-
-
-def test_a_hinge_on_the_handles_own_side_is_none():
-    """Though it is not far from the panel's other edge: a door turns about the edge that the hinge is near."""
-    pose = handle(0.0, 0.4)
-    assert can_be_a_door(np.array([0.2, -0.26, 0.3]), -Z, pose, PANEL)
-    assert not can_be_a_door(np.array([0.2, -0.05, 0.3]), -Z, pose, PANEL)
-
-
-@pytest.mark.parametrize("tilt", [X, Y])
-def test_a_hinge_that_seems_askew_is_upright(tilt):
-    true, pose = np.array([0.2, -0.3, 0.4]), handle(0.05, 0.4)
-    axis = rotation_about(tilt, 0.4) @ Z
-    origin, found = straightened(true + 0.3 * axis, axis, pose, 0.2)
-    np.testing.assert_allclose(found, Z)
-    np.testing.assert_allclose(origin[:2], true[:2], atol=0.06)
-
-
-@pytest.mark.parametrize(
-    ("estimated", "is_at"), [(0.20, 0.165), (0.10, 0.145), (0.155, 0.155)], ids=str
-)
-def test_a_hinge_is_just_behind_the_surface_beside_it(estimated, is_at):
-    """A curved door is 3 cm further back there than at its handle."""
-    across, upright = (
-        g.ravel() for g in np.meshgrid(np.linspace(-0.3, 0.1), np.linspace(0.1, 0.6))
-    )
-    back = 0.03 * ((0.1 - across) / 0.4) ** 4
-    front = np.stack([0.20 - back, across, upright], axis=1)
-    origin, pose = np.array([estimated, -0.3, 0.3]), handle(0.05, 0.4)
-    found = behind_surface(origin, -Z, pose, front, 0.2, PANEL)
-    assert found == pytest.approx(is_at, abs=0.008)
-    nothing = np.zeros((0, 3))
-    assert behind_surface(origin, -Z, pose, nothing, 0.2, PANEL) == estimated
-
-
-@pytest.mark.parametrize(
-    ("upper", "lower", "top", "border"), [(0.7, 0.1, 0.8, 0.2), (0.7, 0.5, 0.8, 0.6)]
-)
-def test_bars_near_the_tops_of_their_panels_tell_where_these_meet(upper, lower, top, border):
-    assert border_of_bars(upper, lower, top) == pytest.approx(border)
-    assert border_of_bars(lower, upper, top) == pytest.approx(border)

@@ -319,14 +319,3 @@ def test_what_bulges_around_where_a_bar_was_sensed_is_none(across):
     # Two bars side by side are two.
     pair = np.concatenate([lying, lying + 0.045 * (Y + Z - way)])
     assert handle_label(pair, at, FRONT)[1]
-
-
-@pytest.mark.parametrize("off", [-0.3, 0.0, 0.3])
-def test_a_long_bar_is_measured_from_end_to_end_wherever_it_was_sensed(off):
-    bar = rectangle(np.array([FRONT + 0.03, -0.4, 0.3]), 0.8 * Y, 0.012 * Z, X)[0]
-    label, seen = handle_label(
-        bar, compose(ACROSS_FRONT, np.array([FRONT + 0.03, off, 0.306])), FRONT
-    )
-    assert seen
-    assert label.extents[0] == pytest.approx(0.8, abs=0.02)
-    assert label.origin[1] == pytest.approx(0.0, abs=0.01)

@@ -9,11 +9,10 @@ from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.shapes.boxes import Boxes
 from manipose_mj.poses import SymmetryGroup, invert, transform
 
-# Rotations of a level and of an upright bar as labels have them, X along the bar and Y out of the front.
-ACROSS_FRONT = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+# Rotations of a level and of an upright bar, X along the bar and Y out of the front.
+ACROSS_FRONT = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 UP_FRONT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _HANDLE_REACH = 0.012  # how far points of a bar are from its axis, across [m]
-_REACH_ALONG = 0.60  # how far along a bar from where it was estimated its points are, at most [m]
 # Of a handle's lengths, to keep clear of: round ones fill no box, and fingers close on them.
 _SOLID = np.array([1.0, 0.8, 0.7])
 _TURNS = SymmetryGroup(np.stack([np.eye(3), np.diag([-1.0, 1.0, -1.0])]))
@@ -55,7 +54,7 @@ def _measured(
     local = transform(invert(handle), points)
     panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
     standing = local[:, 1] > min(panel + _STANDING, -0.006)
-    near = standing & (local[:, 1] < 0.03) & (np.abs(local[:, 0]) < _REACH_ALONG)
+    near = standing & (local[:, 1] < 0.03) & (np.abs(local[:, 0]) < 0.35)
     on = near & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH)
     if on.sum() < 12 or _goes_on(local[near], local[on]):
         usual = np.array([0.10, 0.012, 0.012])
