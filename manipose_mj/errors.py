@@ -13,6 +13,10 @@ class InputError(ValueError):
     """
 
 
+class RecordError(InputError):
+    """What shall be on record cannot be written: it ends the run, and is no episode's failure."""
+
+
 class ServerAbsentError(InputError):
     """Nobody answers at the address of a method's server, or somebody else does."""
 

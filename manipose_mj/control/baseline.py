@@ -29,7 +29,7 @@ from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.planning.transport import lie_wrong
 from manipose_mj.control.scene.scene_estimate import PartEstimate, SceneEstimate
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, RecordError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -185,6 +185,8 @@ class Baseline:
                     candidate = next(candidates)
                 plan = candidate.steps()
                 check_plan(plan, estimate)
+            except RecordError:
+                raise
             except InputError as error:
                 raise StageFailure("plan", str(error)) from None
             # It stands until another plan is chosen.
@@ -204,7 +206,8 @@ class Baseline:
                     ):
                         acted = True
                         yield action
-                hidden = parts_to_look_behind(task.goals, estimate)
+                follows = self._planner.follows_goals
+                hidden = parts_to_look_behind(task.goals, estimate) if follows else ()
                 if len(steps) < len(plan) or (looks > 0 and hidden):
                     looks -= 1
                     yield from self._look_behind(hidden, planner, executor)
@@ -212,8 +215,7 @@ class Baseline:
                 elif not (step_by_step and plan):
                     self.status = "done"
                     yield from executor.wait(_AT_END)
-                    ends = step_by_step or not self._planner.follows_goals
-                    if ends or not self._falls_short(executor):
+                    if step_by_step or not follows or not self._falls_short(executor):
                         yield from executor.wait(_TO_REST if scene.perception.feels_joints else 0.0)
                         return
                     falls_short = True

@@ -70,6 +70,7 @@ def run_episode(
     """
     environment = environment_of(config)
     policy = _baseline(config, pose, plans, planner, estimator, errors, grasps)
+    policy.name_episode(config.task, episode)
     naming = Naming(config.task, episode, pose, masks_of(pose))
     return play(environment, policy, spec, Rules(), naming, policy_seed=planner_seed)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from manipose_mj.control.language.address import check_address, without_secrets
 from manipose_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ class PlannerSettings:
       model: Name of the language model.
       base_url: Of its endpoint; by default OpenAI's.
       replay: File or folder of recorded exchanges.
-      instruction: What a language model shall do instead of the task's goals.
+      instruction: What a language model shall do instead of the task's goals; of a replay, by default what was
+        recorded.
       record: Folder for exchanges; a file a process.
 
     Raises:
@@ -51,6 +53,8 @@ class PlannerSettings:
             )
         if self.kind != "llm" and self.base_url is not None:
             raise InputError("base url: only --planner llm has an endpoint")
+        if self.base_url is not None:
+            check_address(self.base_url)
         for name, text in (("model", self.model), ("instruction", self.instruction)):
             if text is not None and not (text.strip() and _writable(text)):
                 raise InputError(f"{name}: {text!r}; expected words")
@@ -65,13 +69,17 @@ class PlannerSettings:
         """
         # Loads the simulator: workers only.
         from manipose_mj.control.language.planner import LanguagePlanner
+        from manipose_mj.control.language.replay import ReplayModel
         from manipose_mj.control.planning.planner import RulePlanner
 
         model = self.language_model()
         if model is None:
             return RulePlanner()
         record = None if self.record is None else self.record / f"{os.getpid()}.jsonl"
-        return LanguagePlanner(model, self.instruction, record)
+        instruction = self.instruction
+        if isinstance(model, ReplayModel) and instruction is None:
+            instruction = model.instruction
+        return LanguagePlanner(model, instruction, record)
 
     def language_model(self) -> ChatModel | None:
         """What is asked for plans; None for the planner by rules. It loads no simulator.
@@ -80,7 +88,7 @@ class PlannerSettings:
           InputError: As of `make`.
         """
         from manipose_mj.control.language.endpoint import EndpointModel
-        from manipose_mj.control.language.exchanges import ReplayModel
+        from manipose_mj.control.language.replay import ReplayModel
 
         if self.replay is not None:
             return ReplayModel(self.replay)
@@ -105,9 +113,6 @@ class PlannerSettings:
         """The options of the command line that say the same, but for a user, password or query in an address."""
         if self.kind == "rules":
             return []
-        # Loads nothing else.
-        from manipose_mj.control.language.endpoint import without_secrets
-
         words = ["--planner", self.kind]
         for name, value in (
             ("--model", self.model),

@@ -151,6 +151,8 @@ def evaluate(
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
+        if config.dask is None:  # workers elsewhere may have keys of their own
+            config.planner.language_model()
         runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
     del identity["platform version"]  # a new kernel changes no result

@@ -70,6 +70,11 @@ class BaselinePolicy:
         """What it is doing."""
         return self.baseline.status
 
+    def name_episode(self, task: str, episode: int) -> None:
+        """This episode of an evaluation comes next."""
+        if self._planner is not None:
+            self._planner.name_episode(task, episode)
+
     def attach(self, environment: composer.Environment) -> None:
         """Act in this environment, after its first reset, from now on."""
         if environment is not self._environment:

@@ -14,6 +14,8 @@ from manipose_mj.evaluation.planner_settings import PlannerSettings
         ({"kind": "llm", "model": " "}, "model: ' '; expected words"),
         ({"kind": "llm", "model": "m", "instruction": ""}, "instruction: ''; expected words"),
         ({"kind": "llm", "model": "m", "instruction": "open \udcff"}, "instruction: .* expected words"),
+        ({"kind": "llm", "model": "m", "base_url": ""}, "--base-url '': expected an address such as"),
+        ({"kind": "llm", "model": "m", "base_url": "http://me:pw@h:x/v1"}, "--base-url 'http://h:x/v1': expected"),
         ({"kind": "llm"}, "--planner llm needs one"),
     ],
 )  # fmt: skip
@@ -25,7 +27,7 @@ def test_a_mistake_is_one_line(given, words):
 
 def test_an_address_that_is_none_is_told_before_a_planner_is_made():
     with pytest.raises(InputError, match="expected an address"):
-        PlannerSettings("llm", "m", "localhost:8000").language_model()
+        PlannerSettings("llm", "m", "localhost:8000")
 
 
 def test_an_empty_file_of_records_is_told_before_a_planner_is_made(tmp_path):

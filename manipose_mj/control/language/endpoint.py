@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
+import time
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from threading import Thread
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote
 
-from manipose_mj.control.language.exchanges import Message, NoReplyError
+from manipose_mj.control.language.address import (
+    check_address,
+    no_address,
+    secrets_in,
+    without_query,
+)
+from manipose_mj.control.language.completion import answer_in, complaint_in, one_line
+from manipose_mj.control.language.exchanges import Answer, Message, NoReplyError
 from manipose_mj.errors import InputError
 
 KEY_VARIABLE = "OPENAI_API_KEY"
+URL_VARIABLE = "OPENAI_BASE_URL"
 _TIMEOUT = 60.0  # [s]
 _RETRIES = 3  # after 429, 5xx and lost connections; the client waits in between
-_LONGEST = 200  # characters of what an endpoint says of itself
+_WITH_WAITS = 1.25  # of the time of all tries, for what lies between them
+_SHORTEST_SECRET = 8  # characters; "none" and "EMPTY" are no keys, and words of plans are shorter
 # Of ways to ask for structured output, from the strictest on, that which an endpoint may have in the place of another.
 _FORMS = {"json_schema": "json_object", "json_object": None}
+_NAMES = {
+    "response_format": "response_format|json_schema|json_object"
+}  # of a parameter, if several
 _NOT_TAKEN = (400, 422)  # status of what an endpoint does not take
 
 
@@ -33,8 +51,9 @@ class EndpointModel:
 
         Args:
           name: Of the model.
-          base_url: Of the endpoint, such as `http://localhost:8000/v1`; by default OpenAI's.
-          timeout: For an answer [s].
+          base_url: Of the endpoint, such as `http://localhost:8000/v1`; by default that of the variable
+            `OPENAI_BASE_URL`, or OpenAI's.
+          timeout: For an answer [s]; all tries together take at most a quarter longer than each for itself.
           retries: How often a question that failed for the moment is asked again.
 
         Raises:
@@ -46,6 +65,8 @@ class EndpointModel:
             raise InputError(
                 "a language model needs the package openai: pip install 'manipose-mj[llm]'"
             ) from None
+        option = URL_VARIABLE if base_url is None else "--base-url"
+        base_url = os.environ.get(URL_VARIABLE) or None if base_url is None else base_url
         key = os.environ.get(KEY_VARIABLE, "").strip()
         if not key and base_url is None:
             raise InputError(
@@ -54,44 +75,68 @@ class EndpointModel:
         if not (key.isascii() and key.isprintable()):
             raise InputError(f"{KEY_VARIABLE}: holds characters that no key has; copy the key anew")
         if base_url is not None:
-            check_address(base_url)
+            check_address(base_url, option)
+        address, query = (None, {}) if base_url is None else without_query(base_url)
         self.name = name
         self.parameters: dict[str, Any] = {
             "temperature": 0.0,
             "seed": 0,
             "response_format": "json_schema",
         }
-        self._errors, self._key = openai, key
-        # Local servers ask for no key, but the client for any.
-        self._client = openai.OpenAI(
-            api_key=key or "none", base_url=base_url, timeout=timeout, max_retries=retries
-        )
+        self._errors = openai
+        self._secrets = _written_forms([key, *(secrets_in(base_url) if base_url else [])])
+        self._longest = _WITH_WAITS * timeout * (1 + retries)
+        try:
+            self._client = openai.OpenAI(
+                api_key=key or "none",  # local servers ask for no key, but the client for any
+                base_url=address,
+                default_query=query,
+                timeout=timeout,
+                max_retries=retries,
+            )
+        except Exception:  # the library of the client's choice has errors of its own for addresses
+            raise no_address(base_url or "", option) from None
 
-    def answer(self, messages: list[Message], schema: dict[str, Any]) -> str:
-        """The model's reply.
+    def begin(self, task: str, episode: int) -> None:
+        """An episode is as good as any other."""
+
+    def answer(self, messages: list[Message], schema: dict[str, Any]) -> Answer:
+        """The model's reply, without the key.
 
         Raises:
           NoReplyError: It did not answer, or declined in its own way.
         """
+        try:
+            answer = answer_in(self._body(messages, schema))
+        except NoReplyError as failure:
+            # Cut last: half of a key would not be found.
+            raise NoReplyError(one_line(self._without_secrets(str(failure)))) from None
+        return Answer(self._without_secrets(answer.text), answer.cut)
+
+    def _body(self, messages: list[Message], schema: dict[str, Any]) -> bytes:
+        """The body of the answer to a question that is asked for less where an endpoint does not take all.
+
+        Raises:
+          NoReplyError: There is none.
+        """
+        ends = time.monotonic() + self._longest
         while True:
             try:
-                completion = self._asked(messages, schema)
-            except self._errors.APITimeoutError:
+                return _within(ends, lambda: self._asked(messages, schema))
+            except (self._errors.APITimeoutError, TimeoutError):
                 raise NoReplyError("no answer in time") from None
             except self._errors.APIStatusError as error:
-                said = self._line(error.message)
-                if error.status_code in _NOT_TAKEN and self._ask_for_less(error):
+                parameter, said = complaint_in(error.response.content)
+                if error.status_code in _NOT_TAKEN and self._ask_for_less(parameter, said):
                     continue
-                raise NoReplyError(
-                    f"the endpoint answered with status {error.status_code}: {said}"
-                ) from None
+                status = f"the endpoint answered with status {error.status_code}"
+                raise NoReplyError(f"{status}: {said}" if said.strip() else status) from None
             except self._errors.APIConnectionError:
                 raise NoReplyError("the endpoint cannot be reached, or broke off") from None
             except (self._errors.OpenAIError, ValueError, RecursionError) as error:
                 raise NoReplyError(f"the answer cannot be read ({type(error).__name__})") from None
-            return self._text(completion)
 
-    def _asked(self, messages: list[Message], schema: dict[str, Any]) -> Any:
+    def _asked(self, messages: list[Message], schema: dict[str, Any]) -> bytes:
         chat: Any = self._client.chat.completions
         given = dict(self.parameters)
         form = given.pop("response_format", None)
@@ -103,72 +148,60 @@ class EndpointModel:
                 "schema": schema,
                 "strict": True,
             }
-        return chat.create(model=self.name, messages=messages, **given)
+        return chat.with_raw_response.create(model=self.name, messages=messages, **given).content
 
-    def _ask_for_less(self, error: Any) -> bool:
+    def _ask_for_less(self, parameter: str, said: str) -> bool:
         """Leave out the parameter that a refusal names; whether it names one."""
-        said = f"{getattr(error, 'param', '')} {error.message}".lower()
-        for name in tuple(self.parameters):
-            if name in said or (name == "response_format" and "json_schema" in said):
-                less = _FORMS.get(self.parameters.pop(name))
-                if less is not None:
-                    self.parameters[name] = less
-                return True
+        for text in (parameter, said):
+            for name in tuple(self.parameters):
+                if re.search(rf"\b({_NAMES.get(name, name)})\b", text, re.IGNORECASE):
+                    less = _FORMS.get(self.parameters.pop(name))
+                    if less is not None:
+                        self.parameters[name] = less
+                    return True
         return False
 
-    def _text(self, completion: Any) -> str:
-        """What an answer says, without the key.
-
-        Raises:
-          NoReplyError: Nothing, or that it declines.
-        """
-        choices = getattr(completion, "choices", None)
-        if not isinstance(choices, list) or not choices:
-            failed = getattr(completion, "error", None)
-            said = failed.get("message") if isinstance(failed, dict) else None
-            because = f": {self._line(said)}" if said else ""
-            raise NoReplyError(f"an answer without a choice{because}")
-        message = getattr(choices[0], "message", None)
-        if refusal := getattr(message, "refusal", None):
-            raise NoReplyError(f"the model declined: {self._line(refusal)}")
-        content = getattr(message, "content", None)
-        if isinstance(content, list):
-            texts = [part.get("text") for part in content if isinstance(part, dict)]
-            content = "".join(text for text in texts if isinstance(text, str))
-        return self._without_key(content) if isinstance(content, str) else ""
-
-    def _line(self, said: Any) -> str:
-        return " ".join(self._without_key(str(said)).split())[:_LONGEST]
-
-    def _without_key(self, text: str) -> str:
-        # Half of a character that takes two cannot be written.
-        whole = text.encode("utf-8", "replace").decode("utf-8")
-        return whole.replace(self._key, "***") if self._key else whole
+    def _without_secrets(self, text: str) -> str:
+        for secret in self._secrets:
+            text = text.replace(secret, "***")
+        return text
 
 
-def check_address(base_url: str) -> None:
-    """Nothing, if this may be an endpoint's address.
+def _written_forms(secrets: list[str]) -> list[str]:
+    """Secrets as they are, and as they stand in JSON and in addresses; the longest first."""
+    forms = {
+        form
+        for secret in secrets
+        if len(secret) >= _SHORTEST_SECRET
+        for quoted in [json.dumps(secret)[1:-1]]
+        for form in (secret, quoted, quoted.replace("/", "\\/"), quote(secret), quote(secret, ""))
+    }
+    return sorted(forms, key=len, reverse=True)
+
+
+def _within(ends: float, ask: Callable[[], bytes]) -> bytes:
+    """What a call returns, if it does so by then: the client waits for ever for a server that drips.
+
+    Args:
+      ends: When, on the monotonic clock [s].
+      ask: The call; it goes on in the background when its time is over.
 
     Raises:
-      InputError: It is none.
+      TimeoutError: It does not.
     """
+    done: SimpleQueue[tuple[bytes, BaseException | None]] = SimpleQueue()
+
+    def run() -> None:
+        try:
+            done.put((ask(), None))
+        except BaseException as error:
+            done.put((b"", error))
+
+    Thread(target=run, daemon=True).start()
     try:
-        parts = urlsplit(base_url)
-        valid = parts.scheme in ("http", "https") and bool(parts.hostname)
-        valid = valid and (parts.port is None or parts.port > 0)
-    except ValueError:
-        valid = False
-    if not valid:
-        raise InputError(
-            f"--base-url {without_secrets(base_url)!r}: expected an address such as http://localhost:8000/v1"
-        )
-
-
-def without_secrets(base_url: str) -> str:
-    """An address without the user, password and query that may be in it."""
-    start, marked, rest = base_url.partition("://")
-    if not marked:
-        start, rest = "", base_url
-    host, slash, path = rest.partition("/")
-    known = host.rpartition("@")[2]
-    return f"{start}{marked}{known}{slash}{path}".partition("?")[0]
+        body, error = done.get(timeout=max(0.0, ends - time.monotonic()))
+    except Empty:
+        raise TimeoutError from None
+    if error is not None:
+        raise error
+    return body

@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict, deque
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, RecordError
 
 Message = dict[str, str]
+INSTRUCTION = "\n\nInstruction: "  # in a first question, between the scene and what is wanted
+_WORDS = {str: "text", dict: "object"}
+_KINDS: dict[str, Any] = {
+    "model": str,
+    "parameters": dict,
+    "messages": list,
+    "schema": dict,
+    "reply": str,
+    "error": str,
+    "task": str,
+    "number": int,
+    "instruction": str,
+    "at": int | float,
+}
 
 
 @dataclass(frozen=True)
@@ -25,6 +39,12 @@ class Exchange:
       reply: The answer's text; empty where there was none.
       error: Why there was none, in one line; empty otherwise.
       seconds: How long it took.
+      cut: The reply was cut at the greatest length of an answer.
+      task: Of the episode, `"domain/task"`; empty where it is not known.
+      episode: Its index; None where it is not known.
+      number: Of the question within the episode, from 0.
+      instruction: What the model was to do instead of what the episode asks for; empty otherwise.
+      at: When the answer came, in seconds since 1970; 0 in older records.
     """
 
     model: str
@@ -34,11 +54,20 @@ class Exchange:
     reply: str
     error: str = ""
     seconds: float = 0.0
+    cut: bool = False
+    task: str = ""
+    episode: int | None = None
+    number: int = 0
+    instruction: str = ""
+    at: float = 0.0
 
-    @property
-    def question(self) -> str:
-        """What was asked, as text that is equal for equal questions."""
-        return question(self.messages, self.schema)
+
+@dataclass(frozen=True)
+class Answer:
+    """What a model says; `cut`: that it came to the greatest length of an answer before its end."""
+
+    text: str
+    cut: bool = False
 
 
 class NoReplyError(Exception):
@@ -56,7 +85,11 @@ class ChatModel(Protocol):
     name: str
     parameters: dict[str, Any]
 
-    def answer(self, messages: list[Message], schema: dict[str, Any]) -> str:
+    def begin(self, task: str, episode: int) -> None:
+        """The questions of this episode come next."""
+        ...
+
+    def answer(self, messages: list[Message], schema: dict[str, Any]) -> Answer:
         """The reply to the last message, of the schema if the model keeps to it.
 
         Raises:
@@ -65,23 +98,21 @@ class ChatModel(Protocol):
         ...
 
 
-def question(messages: list[Message], schema: dict[str, Any]) -> str:
-    """Messages and schema as text."""
-    return json.dumps([messages, schema], sort_keys=True)
-
-
 def append_exchange(path: Path, exchange: Exchange) -> None:
     """Add a record to a file of JSON lines.
 
     Raises:
-      InputError: It cannot be written.
+      RecordError: It cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(asdict(exchange)) + "\n")
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        raise RecordError(
+            f"{path}: exchanges cannot be written there ({error.strerror or error}); "
+            "make room, or choose another --out"
+        ) from None
 
 
 def read_exchanges(path: Path) -> list[Exchange]:
@@ -102,49 +133,30 @@ def read_exchanges(path: Path) -> list[Exchange]:
 
 def _records(path: Path) -> list[Exchange]:
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        *lines, unfinished = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     records = []
     for number, line in enumerate(lines, 1):
         try:
-            record = Exchange(**json.loads(line))
-            if not isinstance(record.reply, str) or not isinstance(record.error, str):
-                raise TypeError("reply and error are text")
-            records.append(record)
+            records.append(_record(json.loads(line)))
         except (ValueError, TypeError, RecursionError) as error:
             raise InputError(f"{path}, line {number}: no recorded exchange ({error})") from None
+    with suppress(ValueError, TypeError, RecursionError):  # of a process that was killed
+        records.append(_record(json.loads(unfinished)))
     return records
 
 
-class ReplayModel:
-    """Gives the recorded answers to each question, in their order, and none to any other."""
+def _record(document: Any) -> Exchange:
+    """The record that a line holds.
 
-    def __init__(self, path: Path) -> None:
-        """Reads the records.
-
-        Raises:
-          InputError: They cannot be read.
-        """
-        exchanges = read_exchanges(path)
-        self.name = f"replay of {exchanges[0].model}"
-        self.parameters: dict[str, Any] = {"replay": path.name}
-        self._answers: dict[str, deque[Exchange]] = defaultdict(deque)
-        for each in exchanges:
-            self._answers[each.question].append(each)
-
-    def answer(self, messages: list[Message], schema: dict[str, Any]) -> str:
-        """The recorded reply; to a question that was asked several times, one after the other, then the last.
-
-        Raises:
-          NoReplyError: The question was not recorded, or had no reply then either.
-        """
-        answers = self._answers.get(question(messages, schema))
-        if not answers:
-            raise NoReplyError(
-                "this question is not among the recorded ones; an own --instruction has to be given again"
-            )
-        found = answers.popleft() if len(answers) > 1 else answers[0]
-        if found.error:
-            raise NoReplyError(found.error)
-        return found.reply
+    Raises:
+      TypeError: It has other fields, or others in them.
+    """
+    record = Exchange(**document)
+    for name, kind in _KINDS.items():
+        if not isinstance(getattr(record, name), kind):
+            raise TypeError(f"field {name!r} is no {_WORDS.get(kind, kind.__name__)}")
+    if not all(isinstance(message, dict) for message in record.messages):
+        raise TypeError("field 'messages' is no list of messages")
+    return record

@@ -10,6 +10,8 @@ from typing import Any
 from manipose_mj.control.language.description import RULES, scene_text
 from manipose_mj.control.language.destinations import Destination, named_destinations
 from manipose_mj.control.language.exchanges import (
+    INSTRUCTION,
+    Answer,
     ChatModel,
     Exchange,
     Message,
@@ -31,6 +33,8 @@ from manipose_mj.errors import InputError
 from manipose_mj.tasks.goals import Goal
 
 MAX_REPAIRS = 2
+_MOST_SENT_BACK = 20_000  # characters of a plan that is to be mended
+_TOO_LONG = "reply: it was cut off, for it is longer than an answer may be; give a shorter one"
 
 
 class LanguagePlanner:
@@ -52,11 +56,18 @@ class LanguagePlanner:
         """
         self._model, self._instruction, self._record = model, instruction, record
         self._asked_for = instruction or ""
+        self._episode: tuple[str, int | None] = ("", None)
+        self._number = 0  # of the next question of this episode
 
     @property
     def follows_goals(self) -> bool:
         """Whether it plans what the episode asks for."""
         return self._instruction is None
+
+    def name_episode(self, task: str, episode: int) -> None:
+        """This episode comes next; its exchanges bear its name."""
+        self._episode, self._number = (task, episode), 0
+        self._model.begin(task, episode)
 
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
@@ -78,6 +89,7 @@ class LanguagePlanner:
 
         Raises:
           InputError: The model does not answer, declines, or its last repair is still wrong.
+          RecordError: The exchange cannot be written.
         """
 
         def free(obj):
@@ -107,19 +119,20 @@ class LanguagePlanner:
 
         Raises:
           InputError: The model does not answer, declines, or its last repair is still wrong.
+          RecordError: The exchange cannot be written.
         """
         mistake = ""
         for _ in range(1 + MAX_REPAIRS):
-            reply = self._ask(messages, schema)
+            answer = self._ask(messages, schema)
             try:
-                return read_reply(reply, estimate, destinations)
+                return read_reply(answer.text, estimate, destinations)
             except RefusedError as refusal:
                 raise InputError(f"the language model declines: {refusal}") from None
             except InputError as error:
-                mistake = str(error)
+                mistake = _TOO_LONG if answer.cut else str(error)
             messages = [
                 *messages,
-                {"role": "assistant", "content": reply},
+                {"role": "assistant", "content": answer.text[:_MOST_SENT_BACK]},
                 {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
             ]
         raise InputError(
@@ -130,28 +143,52 @@ class LanguagePlanner:
         """The conversation that opens an exchange."""
         return [
             {"role": "system", "content": RULES},
-            {"role": "user", "content": f"{scene}\n\nInstruction: {self._asked_for}"},
+            {"role": "user", "content": f"{scene}{INSTRUCTION}{self._asked_for}"},
         ]
 
-    def _ask(self, messages: list[Message], schema: dict[str, Any]) -> str:
-        started, reply, error = time.perf_counter(), "", ""
+    def _ask(self, messages: list[Message], schema: dict[str, Any]) -> Answer:
+        started = time.perf_counter()
+        answer, error = Answer(""), "the question was broken off"
         try:
-            reply = self._model.answer(messages, schema)
+            answer, error = self._model.answer(messages, schema), ""
         except NoReplyError as failure:
             error = str(failure)
-        if self._record is not None:
-            append_exchange(
-                self._record,
-                Exchange(
-                    self._model.name,
-                    self._model.parameters,
-                    messages,
-                    schema,
-                    reply,
-                    error,
-                    round(time.perf_counter() - started, 3),
-                ),
-            )
+        finally:  # whatever came of it
+            self._keep(messages, schema, answer, error, time.perf_counter() - started)
         if error:
             raise InputError(f"the language model gives no plan: {error}")
-        return reply
+        return answer
+
+    def _keep(
+        self,
+        messages: list[Message],
+        schema: dict[str, Any],
+        answer: Answer,
+        error: str,
+        seconds: float,
+    ) -> None:
+        """Put an exchange on record.
+
+        Raises:
+          RecordError: It cannot be written.
+        """
+        number, self._number = self._number, self._number + 1
+        if self._record is None:
+            return
+        task, episode = self._episode
+        exchange = Exchange(
+            self._model.name,
+            self._model.parameters,
+            messages,
+            schema,
+            answer.text,
+            error,
+            round(seconds, 3),
+            answer.cut,
+            task,
+            episode,
+            number,
+            self._instruction or "",
+            round(time.time(), 3),
+        )
+        append_exchange(self._record, exchange)

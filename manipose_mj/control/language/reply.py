@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from manipose_mj.control.language.completion import one_line
 from manipose_mj.control.language.destinations import Destination
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.check import PlanState
@@ -81,8 +82,9 @@ def read_reply(
     if refusal.strip():
         if entries:
             raise InputError("reply: a plan and a refusal; expected one of them")
-        whole = refusal.encode("utf-8", "replace").decode("utf-8")
-        raise RefusedError(" ".join(whole.split())[:_LONGEST])
+        raise RefusedError(one_line(refusal))
+    if refusal and not entries:
+        raise RefusedError("it gives no reason")
     state = PlanState(estimate)
     steps = tuple(
         _step(entry, f"plan[{i}]", estimate, destinations, state) for i, entry in enumerate(entries)
@@ -125,12 +127,16 @@ def _step(
 ) -> Step | NamedMove:
     if isinstance(entry, dict) and "poses" in entry:
         raise InputError(f"{where}: no field 'poses'; a move of an object names its 'destination'")
+    if isinstance(entry, dict) and entry.get("primitive") == "move_to" and len(entry) == 2:
+        raise InputError(f"{where}: move_to needs one of 'destination' and 'opening'")
     if not isinstance(entry, dict) or "destination" not in entry:
         subjects = {*estimate.objects, *estimate.parts}
         try:
             (step,) = plan_from_json(json.dumps([entry]), subjects)
         except InputError as error:
-            raise InputError(str(error).replace("plan[0]", where)) from None
+            raise InputError(str(error).replace("plan[0]", where, 1)) from None
+        except RecursionError:
+            raise InputError(f"{where}: lists within lists; expected a step") from None
         state.carry_out(step, where)
         return step
     if set(entry) != {"primitive", "subject", "destination"} or entry["primitive"] != "move_to":

@@ -32,6 +32,10 @@ class TaskPlanner(Protocol):
         """As above."""
         ...
 
+    def name_episode(self, task: str, episode: int) -> None:
+        """This episode of an evaluation comes next."""
+        ...
+
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
         ...
@@ -60,6 +64,9 @@ class RulePlanner:
     """Plans by the rules of this module."""
 
     follows_goals = True
+
+    def name_episode(self, task: str, episode: int) -> None:
+        """Rules are the same in all."""
 
     def begin(self, instruction: str) -> None:
         """Goals say all that rules need."""

@@ -9,13 +9,15 @@ from http.server import BaseHTTPRequestHandler
 
 import pytest
 
+from manipose_mj.control.language.address import without_secrets
 from manipose_mj.control.language.description import scene_text
 from manipose_mj.control.language.destinations import named_destinations
-from manipose_mj.control.language.endpoint import KEY_VARIABLE, EndpointModel
-from manipose_mj.control.language.exchanges import ReplayModel, read_exchanges
+from manipose_mj.control.language.endpoint import KEY_VARIABLE, URL_VARIABLE, EndpointModel
+from manipose_mj.control.language.exchanges import read_exchanges
 from manipose_mj.control.language.planner import MAX_REPAIRS, LanguagePlanner
+from manipose_mj.control.language.replay import ReplayModel
 from manipose_mj.control.language.reply import reply_schema
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, RecordError
 from tests.control.language.local_server import Server, says, send, status
 from tests.control.language.scenes import kitchen
 
@@ -82,7 +84,7 @@ def test_a_good_plan_is_taken_and_on_record_without_the_key(serve, tmp_path):
     assert (exchange.reply, exchange.error, exchange.model) == (GOOD, "", "m")
     assert exchange.messages == request["messages"]
     assert KEY not in path.read_text(encoding="utf-8")
-    assert ReplayModel(path).answer(exchange.messages, exchange.schema) == GOOD
+    assert ReplayModel(path).answer(exchange.messages, {}).text == GOOD
 
 
 @pytest.mark.parametrize(
@@ -162,18 +164,25 @@ def refuses(parameter: str, message: str = ""):
     return lambda handler: send(handler, 400, body)
 
 
+def fields_refused(name: str):
+    """Answers as a server of FastAPI that does not take a field."""
+    detail = [{"loc": ["body", name], "msg": "Extra inputs are not permitted"}]
+    return lambda handler: send(handler, 422, json.dumps({"detail": detail}))
+
+
 @pytest.mark.parametrize(
     ("refusals", "left"),
     [
         ([refuses("temperature")], {"seed": 0, "response_format": "json_schema"}),
         ([refuses("seed")], {"temperature": 0.0, "response_format": "json_schema"}),
+        ([fields_refused("seed")], {"temperature": 0.0, "response_format": "json_schema"}),
         ([refuses("response_format")], {"temperature": 0.0, "seed": 0, "response_format": "json_object"}),
         (
             [refuses("", "This response_format type is unavailable now"), refuses("response_format"), refuses("seed")],
             {"temperature": 0.0},
         ),
     ],
-    ids=["temperature", "seed", "schema", "one after the other"],
+    ids=["temperature", "seed", "field", "schema", "one after the other"],
 )  # fmt: skip
 def test_what_an_endpoint_does_not_take_is_left_out(serve, tmp_path, refusals, left):
     server = serve(*refusals, says(GOOD), says(GOOD))
@@ -254,7 +263,112 @@ def test_a_keys_spaces_do_not_count(serve, tmp_path, monkeypatch):
 
 
 def test_an_address_is_on_record_without_secrets():
-    from manipose_mj.control.language.endpoint import without_secrets
-
     assert without_secrets("http://me:pw@host:1/v1?api-key=s") == "http://host:1/v1"
     assert without_secrets("https://api.openai.com/v1") == "https://api.openai.com/v1"
+
+
+def test_a_server_that_drips_is_not_waited_for(serve, tmp_path):
+    def drips(handler: BaseHTTPRequestHandler) -> None:
+        handler.send_response(200)
+        handler.end_headers()
+        for _ in range(30):
+            handler.wfile.write(b" ")
+            handler.wfile.flush()
+            time.sleep(0.1)
+
+    ask, path = asked(serve(drips), tmp_path, timeout=0.4, retries=0)
+    started = time.monotonic()
+    with pytest.raises(InputError, match="no answer in time"):
+        ask()
+    assert time.monotonic() - started < 1.5
+    assert read_exchanges(path)[0].error == "no answer in time"
+
+
+def test_an_answer_that_was_cut_is_asked_for_shorter(serve, tmp_path):
+    choice = {"finish_reason": "length", "message": {"content": GOOD[:40]}}
+    server = serve(raw(json.dumps({"choices": [choice]})), says(GOOD))
+    ask, path = asked(server, tmp_path)
+    assert len(ask()) == 3
+    assert "it was cut off" in server.requests[1]["messages"][-1]["content"]
+    again = LanguagePlanner(ReplayModel(path), "Open the top drawer.")
+    estimate = kitchen()
+    places = named_destinations((), estimate)
+    messages = again.question(scene_text(estimate, places))
+    assert len(again.steps(messages, {}, estimate, places)) == 3
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [{"text": GOOD}, {"message": {"content": json.loads(GOOD)}}, {"message": {"content": [GOOD]}}],
+    ids=["text beside it", "an object", "parts"],
+)
+def test_a_plan_is_found_in_answers_of_other_forms(serve, tmp_path, choice):
+    ask, _ = asked(serve(raw(json.dumps({"choices": [choice]}))), tmp_path)
+    assert len(ask()) == 3
+
+
+def test_an_error_that_came_as_an_answer_is_told(serve, tmp_path):
+    ask, _ = asked(serve(raw('{"error": {"message": "overloaded"}}')), tmp_path)
+    with pytest.raises(InputError, match="an answer without a choice: overloaded"):
+        ask()
+
+
+def test_reasons_are_short_and_hold_no_part_of_a_key(serve, tmp_path):
+    said = "x" * 150 + f" {KEY} " + "y" * 300_000
+    ask, path = asked(serve(refuses("model", said), says(None, refusal=said)), tmp_path)
+    for _ in range(2):
+        with pytest.raises(InputError) as caught:
+            ask()
+        assert len(str(caught.value)) < 300
+    assert KEY[:10] not in path.read_text(encoding="utf-8")
+
+
+def test_a_short_word_in_place_of_a_key_does_not_spoil_plans(serve, tmp_path, monkeypatch):
+    server = serve(says(GOOD))
+    monkeypatch.setenv(KEY_VARIABLE, "top")
+    ask, _ = asked(server, tmp_path)
+    assert len(ask()) == 3
+
+
+def test_every_exchange_is_on_record_even_if_the_model_breaks(tmp_path):
+    class Broken:
+        name, parameters = "m", {}
+
+        def begin(self, task, episode) -> None: ...
+
+        def answer(self, messages, schema):
+            raise RuntimeError("broken")
+
+    planner = LanguagePlanner(Broken(), "Open the top drawer.", tmp_path / "1.jsonl")
+    with pytest.raises(RuntimeError, match="broken"):
+        planner.steps(planner.question("scene"), {}, kitchen(), {})
+    assert read_exchanges(tmp_path)[0].error == "the question was broken off"
+
+
+def test_an_exchange_that_cannot_be_written_is_no_failure_of_the_model(serve, tmp_path):
+    (tmp_path / "file").touch()
+    ask, _ = asked(serve(says(GOOD)), tmp_path / "file")
+    with pytest.raises(RecordError, match="exchanges cannot be written there"):
+        ask()
+
+
+def test_the_address_may_come_from_the_client_s_variable(serve, tmp_path, monkeypatch):
+    server = serve(says(GOOD))
+    monkeypatch.delenv(KEY_VARIABLE)
+    monkeypatch.setenv(URL_VARIABLE, server.url)
+    assert EndpointModel("m").answer([], {}).text == GOOD
+    monkeypatch.setenv(URL_VARIABLE, "localhost:8000")
+    with pytest.raises(InputError, match=f"{URL_VARIABLE} 'localhost:8000': expected an address"):
+        EndpointModel("m")
+
+
+def test_a_query_of_an_address_is_sent_behind_what_is_asked_for(serve):
+    paths = []
+
+    def remembers(handler: BaseHTTPRequestHandler) -> None:
+        paths.append(handler.path)
+        says(GOOD)(handler)
+
+    server = serve(remembers)
+    EndpointModel("m", f"{server.url}?api-version=3").answer([], {})
+    assert paths == ["/v1/chat/completions?api-version=3"]

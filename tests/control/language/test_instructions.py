@@ -12,8 +12,9 @@ import pytest
 
 from manipose_mj.control.language.description import scene_text
 from manipose_mj.control.language.destinations import named_destinations
-from manipose_mj.control.language.exchanges import Exchange, ReplayModel, append_exchange
+from manipose_mj.control.language.exchanges import Answer, Exchange, append_exchange
 from manipose_mj.control.language.planner import LanguagePlanner
+from manipose_mj.control.language.replay import ReplayModel
 from manipose_mj.control.language.reply import NamedMove, reply_schema
 from manipose_mj.control.planning.check import PlanState, check_plan
 from manipose_mj.errors import InputError
@@ -46,8 +47,10 @@ class Recorder:
     def __init__(self, replies: list[str]) -> None:
         self._replies = list(replies)
 
-    def answer(self, messages, schema) -> str:
-        return self._replies.pop(0)
+    def begin(self, task, episode) -> None: ...
+
+    def answer(self, messages, schema) -> Answer:
+        return Answer(self._replies.pop(0))
 
 
 def found(state: PlanState, name: str) -> str:

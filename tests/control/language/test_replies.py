@@ -11,13 +11,14 @@ from manipose_mj.control.language.destinations import named_destinations
 from manipose_mj.control.language.exchanges import (
     Exchange,
     NoReplyError,
-    ReplayModel,
     append_exchange,
     read_exchanges,
 )
 from manipose_mj.control.language.planner import LanguagePlanner
+from manipose_mj.control.language.replay import ReplayModel
 from manipose_mj.control.language.reply import RefusedError, read_reply, reply_schema
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation.planner_settings import PlannerSettings
 from tests.control.language.scenes import kitchen
 
 GRASP = {"primitive": "grasp_at", "subject": "mug"}
@@ -63,10 +64,12 @@ def test_a_plan_is_found_wherever_a_model_puts_it(text):
         ("[" * 100_000, "not valid JSON"),
         ("9" * 5000, "not valid JSON|expected an object"),
         (json.dumps({"plan": [GRASP, POSES, RELEASE]}), r"plan\[1\]: no field 'poses'"),
+        (json.dumps({"plan": [GRASP, {"primitive": "move_to", "subject": "mug"}]}), "one of 'destination' and"),
+        ('{"plan": [%s]}' % ("[" * 900 + "]" * 900), "plan|not valid JSON"),
         (json.dumps({"plan": [GRASP, MOVE | {"subject": ["mug"]}]}), "field 'subject' is"),
         (json.dumps({"plan": [{"primitive": "grasp_at", "subject": "x" * 9000}]}), "x\\.\\.\\.; exp"),
     ],
-    ids=["prose", "deep", "long number", "poses", "list", "long name"],
+    ids=["prose", "deep", "long number", "poses", "no place", "nested", "list", "long name"],
 )  # fmt: skip
 def test_what_is_no_plan_is_told_in_one_short_line(text, words):
     with pytest.raises(InputError, match=words) as caught:
@@ -79,6 +82,11 @@ def test_a_long_refusal_is_cut_and_can_be_written():
         read(json.dumps({"plan": [], "refusal": "no \ud83d " * 10_000}))
     assert len(str(caught.value)) <= 200
     str(caught.value).encode("utf-8")
+
+
+def test_a_blank_refusal_is_one():
+    with pytest.raises(RefusedError, match="it gives no reason"):
+        read(json.dumps({"plan": [], "refusal": " "}))
 
 
 def test_every_field_of_the_schema_says_its_type():
@@ -103,7 +111,7 @@ def test_a_question_asked_again_is_answered_in_its_order(tmp_path):
     for number, reply in ((9999, "one"), (10000, "two")):
         append_exchange(tmp_path / f"{number}.jsonl", replace(first, reply=reply))
     model = ReplayModel(tmp_path)
-    assert [model.answer(first.messages, {}) for _ in range(3)] == ["one", "two", "two"]
+    assert [model.answer(first.messages, {}).text for _ in range(3)] == ["one", "two", "two"]
     with pytest.raises(NoReplyError, match="not among the recorded ones"):
         model.answer([], {})
 
@@ -120,3 +128,68 @@ def test_an_own_instruction_is_not_planned_again_until_the_goals_are_met(tmp_pat
     model = ReplayModel(tmp_path)
     assert LanguagePlanner(model).follows_goals
     assert not LanguagePlanner(model, "Open the top drawer.").follows_goals
+
+
+ASKED = [{"role": "system", "content": "rules"}, {"role": "user", "content": "scene\n\nInstruction: a"}]  # fmt: skip
+
+
+def recorded(reply: str, episode: int, number: int, at: float, **more) -> Exchange:
+    return Exchange(
+        "m", {}, ASKED, {}, reply, "", 0.1, False, "a/b", episode, number, at=at, **more
+    )
+
+
+def test_each_episode_gets_its_own_answers_again_in_whatever_order_episodes_are_played(tmp_path):
+    """Two processes have played them, one of which was killed and began its episode anew."""
+    for name, exchange in (
+        ("10", recorded("killed", 0, 0, at=1.0)),
+        ("9", recorded("other one", 1, 0, at=2.0)),
+        ("9", recorded("first", 0, 0, at=4.0)),
+        ("10", recorded("other two", 1, 1, at=3.0)),
+        ("9", recorded("second", 0, 1, at=5.0)),
+    ):
+        append_exchange(tmp_path / f"{name}.jsonl", exchange)
+    for order in ((0, 1), (1, 0)):
+        model, given = ReplayModel(tmp_path), {}
+        for episode in order:
+            model.begin("a/b", episode)
+            given[episode] = [model.answer(ASKED, {}).text for _ in range(3)]
+        assert given == {
+            0: ["first", "second", "second"],
+            1: ["other one", "other two", "other two"],
+        }
+
+
+def test_exchanges_bear_the_name_of_their_episode(tmp_path):
+    append_exchange(tmp_path / "1.jsonl", recorded(PLAIN, 4, 0, at=1.0))
+    planner = LanguagePlanner(ReplayModel(tmp_path), record=tmp_path / "2.jsonl")
+    for episode in (4, 5):
+        planner.name_episode("a/b", episode)
+        planner.begin("a")
+        for _ in range(2):
+            planner.steps(ASKED, {}, kitchen(), {})
+    found = read_exchanges(tmp_path / "2.jsonl")
+    named = [(each.task, each.episode, each.number) for each in found]
+    assert named == [("a/b", 4, 0), ("a/b", 4, 1), ("a/b", 5, 0), ("a/b", 5, 1)]
+    assert all(each.at > 0 for each in found)
+
+
+def test_a_replay_takes_an_own_instruction_from_the_records(tmp_path):
+    append_exchange(tmp_path / "1.jsonl", recorded(PLAIN, 0, 0, 1.0, instruction="Open it."))
+    assert not PlannerSettings("replay", replay=tmp_path).make().follows_goals
+    append_exchange(tmp_path / "1.jsonl", recorded(PLAIN, 1, 0, 1.0))
+    assert PlannerSettings("replay", replay=tmp_path).make().follows_goals
+
+
+def test_another_instruction_than_the_recorded_one_is_named(tmp_path):
+    append_exchange(tmp_path / "1.jsonl", Exchange("m", {}, ASKED, {}, PLAIN))
+    other = [ASKED[0], ASKED[1] | {"content": "scene\n\nInstruction: b"}]
+    with pytest.raises(NoReplyError, match="was recorded with --instruction 'a'"):
+        ReplayModel(tmp_path).answer(other, {})
+
+
+def test_the_line_of_a_process_that_was_killed_is_left_out(tmp_path):
+    append_exchange(tmp_path / "1.jsonl", Exchange("m", {}, ASKED, {}, PLAIN))
+    with (tmp_path / "1.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"model": "m", "par')
+    assert len(read_exchanges(tmp_path)) == 1

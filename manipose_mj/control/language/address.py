@@ -1,0 +1,58 @@
+"""Addresses of endpoints: which can be one, and what of them is nobody's business."""
+
+from __future__ import annotations
+
+from urllib.parse import parse_qsl, urlsplit
+
+from manipose_mj.errors import InputError
+
+_EXAMPLE = "http://localhost:8000/v1"
+
+
+def check_address(address: str, option: str = "--base-url") -> None:
+    """Nothing, if this may be an endpoint's address.
+
+    Args:
+      address: As it was given.
+      option: By which.
+
+    Raises:
+      InputError: It is none.
+    """
+    try:
+        parts = urlsplit(address)
+        valid = parts.scheme in ("http", "https") and bool(parts.hostname)
+        valid = valid and (parts.port is None or parts.port > 0)
+    except ValueError:
+        valid = False
+    if not valid or not address.isprintable() or " " in address:
+        raise no_address(address, option)
+
+
+def no_address(address: str, option: str = "--base-url") -> InputError:
+    """The error for what is no address, without the secrets in it."""
+    return InputError(
+        f"{option} {without_secrets(address)[:200]!r}: expected an address such as {_EXAMPLE}"
+    )
+
+
+def without_secrets(address: str) -> str:
+    """An address without the user, password and query that may be in it."""
+    start, marked, rest = address.partition("://")
+    if not marked:
+        start, rest = "", address
+    host, slash, path = rest.partition("/")
+    known = host.rpartition("@")[2]
+    return f"{start}{marked}{known}{slash}{path}".partition("?")[0].partition("#")[0]
+
+
+def without_query(address: str) -> tuple[str, dict[str, str]]:
+    """An address up to its query, and the query, which belongs behind what is asked for there."""
+    start, _, query = address.partition("#")[0].partition("?")
+    return start, dict(parse_qsl(query, keep_blank_values=True))
+
+
+def secrets_in(address: str) -> list[str]:
+    """What `without_secrets` leaves out: the password and the query's values."""
+    password = urlsplit(address).password
+    return [*([password] if password else []), *without_query(address)[1].values()]
