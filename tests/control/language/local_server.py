@@ -31,7 +31,7 @@ class Server:
         self._server.server_close()
 
 
-def says(text: str | None, **message):
+def says(text: str | list | None, **message):
     """Answer as an endpoint does."""
 
     def answer(handler: BaseHTTPRequestHandler) -> None:

@@ -54,7 +54,8 @@ def read(text: str):
     ids=["plain", "fence", "prose", "thought", "braces", "mark", "no refusal", "null", "blank"],
 )
 def test_a_plan_is_found_wherever_a_model_puts_it(text):
-    assert [step.primitive for step in read(text)] == ["grasp_at", "move_to", "release"]
+    steps = [str(step) for step in read(text)]
+    assert steps == ["grasp_at top_drawer", "move_to top_drawer", "release top_drawer"]
 
 
 @pytest.mark.parametrize(
