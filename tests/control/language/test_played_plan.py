@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from manipose_mj.cli.main import main
+from manipose_mj.control import baseline
 from manipose_mj.control.language.endpoint import KEY_VARIABLE
+from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.planner_settings import PlannerSettings
@@ -91,6 +93,17 @@ def test_an_own_instruction_is_carried_out_once_and_replayed_without_being_given
     assert main(["evaluate", *EPISODE, *from_file, "--out", str(replayed)]) == 0
     assert played(asked) == played(replayed)
     assert (played(asked).failure, played(asked).decisions > 10) == ("release", True)
+
+
+@pytest.mark.full
+def test_an_own_instruction_looks_behind_nothing_for_the_goals(tmp_path, monkeypatch):
+    """As with furniture that is estimated, where goals may be about what a part hides."""
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    monkeypatch.setattr(OraclePerception, "feels_joints", True)
+    monkeypatch.setattr(baseline, "parts_to_look_behind", lambda goals, estimate: ("door",))
+    server = Server([says('{"plan": [], "refusal": ""}')] * 8)
+    assert by_model(server, tmp_path, "--instruction", "Leave all as it is.") == 0
+    assert len(server.requests) == 1 and played(tmp_path).failure == "release"
 
 
 @pytest.mark.full
