@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -145,6 +146,14 @@ def test_an_episode_without_trajectory_keeps_its_place(tmp_path: Path) -> None:
     page = write_report(tmp_path, scene=fake.scene).read_text(encoding="utf-8")
     assert "the episode left no trajectory" in page
     assert "qacc is not finite" in page
+
+
+def test_a_reason_with_half_a_character_does_not_lose_the_page(tmp_path: Path) -> None:
+    evaluate(EvaluationConfig(fake.TASKS[:1], tmp_path, episodes=4), runner=fake.make_runner())
+    first = read_results(tmp_path / "results.jsonl")[0][0]
+    broken = replace(first, success_at_end=False, failure="plan", reason="no \ud83d")
+    records.write_sorted(tmp_path / "results.jsonl", [broken])
+    assert "no ?" in write_report(tmp_path, scene=fake.scene).read_text(encoding="utf-8")
 
 
 def test_a_folder_without_evaluation_is_an_input_error(tmp_path: Path) -> None:
