@@ -66,7 +66,7 @@ def make(
 
 
 def from_pool(
-    pool: StartPool | Path,
+    pool: StartPool | Path | str,
     worlds: int,
     engine: EngineName = "auto",
     *,
@@ -81,7 +81,7 @@ def from_pool(
     """
     require_worlds(worlds)
     chosen = available_engine(engine)
-    if isinstance(pool, Path):
+    if isinstance(pool, Path | str):
         pool = StartPool.load(pool)
     if chosen == "warp":
         from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are

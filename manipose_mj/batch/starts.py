@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,6 +120,17 @@ class StartPool:
         """Of the starts, by row."""
         return tuple(start.seed for start in self.starts)
 
+    @property
+    def digest(self) -> str:
+        """Of what the starts are about: objects, states, models and latencies; equal for equal pools."""
+        text = hashlib.sha256()
+        for start in self.starts:
+            text.update(f"{start.object_name} {start.scene} {start.latency}".encode())
+            text.update(np.ascontiguousarray(start.simulation).tobytes())
+            for name, values in sorted(start.model.items()):
+                text.update(name.encode() + np.ascontiguousarray(values).tobytes())
+        return text.hexdigest()
+
     def rows(self, seeds: list[int]) -> list[int]:
         """Where the starts of these seeds are.
 
@@ -135,21 +147,21 @@ class StartPool:
                 )
         return [known[seed] for seed in seeds]
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write the pool to a file, to be read by the same version of MuJoCo."""
-        with new_cache_file(path) as scratch:
+        with new_cache_file(Path(path)) as scratch:
             scratch.write_bytes(pickle.dumps((mujoco.__version__, self)))
 
     @classmethod
-    def load(cls, path: Path) -> StartPool:
+    def load(cls, path: Path | str) -> StartPool:
         """A pool that was saved; only load files that you trust.
 
         Raises:
           InputError: There is none, or it is of another version of MuJoCo.
         """
         try:
-            version, pool = pickle.loads(path.read_bytes())
-        except (OSError, pickle.UnpicklingError, ValueError, EOFError) as error:
+            version, pool = pickle.loads(Path(path).read_bytes())
+        except (OSError, pickle.UnpicklingError, ValueError, TypeError, EOFError) as error:
             raise InputError(f"{path}: no pool of starts can be read from it ({error})") from None
         if version != mujoco.__version__:
             raise InputError(

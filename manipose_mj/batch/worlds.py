@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -148,7 +149,15 @@ class Worlds:
           action: Of each.
           hold: Control steps for which the servos go where the action sent them, as in evaluations of policies with
             fewer actions a second. The reward is the last one's.
+
+        Raises:
+          InputError: Actions have another shape, or `hold` is no positive whole number.
         """
+        if not isinstance(hold, int | np.integer) or hold < 1:
+            raise InputError(
+                f"hold is {hold!r}; expected a whole number of control steps from 1 on"
+            )
+        self._check_shape(jnp.shape(action))
         return self._step_jit(state, action, hold)
 
     def rollout(
@@ -168,7 +177,7 @@ class Worlds:
           key: For the policy.
 
         Raises:
-          InputError: A policy is given without `steps`.
+          InputError: A policy is given without `steps`, or actions have another shape.
         """
         if callable(policy):
             if steps is None:
@@ -176,7 +185,8 @@ class Worlds:
             keys = jax.random.split(jax.random.key(0) if key is None else key, steps)
 
             def act_and_step(state: State, own: Array) -> tuple[State, Transition]:
-                action = policy(state.observation, own)
+                action: Any = policy(state.observation, own)
+                self._check_shape(jnp.shape(action))
                 after = self._step_jit(state, action, 1)
                 return after, _transition(action, after)
 
@@ -186,9 +196,11 @@ class Worlds:
             after = self._unseen_jit(going.state, action, 1)
             return after, _transition(action, after.state)
 
+        recorded = jnp.asarray(policy)
+        self._check_shape(recorded.shape[1:])
         # Nobody looks before the last step.
         blind = _Unseen(_without_observations(state), state.measurement, state.row)
-        last, seen = jax.lax.scan(step, blind, jnp.asarray(policy)[:steps])
+        last, seen = jax.lax.scan(step, blind, recorded[:steps])
         return (self._seen(last) if len(seen.reward) else state), seen
 
     def seeds(self, state: State) -> Int[np.ndarray, " worlds"]:
@@ -212,7 +224,7 @@ class Worlds:
         try:
             with np.load(path) as file:
                 saved = {name: file[name] for name in file.files}
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: no state of worlds can be read from it ({error})") from None
         for name, own in self._identity().items():
             if name not in saved or not np.array_equal(saved[name], own):
@@ -227,12 +239,18 @@ class Worlds:
         """Free what the engine holds."""
         self.engine.close()
 
+    def _check_shape(self, shape: tuple[int, ...]) -> None:
+        expected = (self.count, len(self.lower))
+        if shape != expected:
+            raise InputError(f"the actions of a step have shape {shape}; expected {expected}")
+
     def _identity(self) -> dict[str, Any]:
         layout = self.pool.layout
         options = (layout.task, layout.obs_mode, layout.control_mode, layout.reward_mode)
         return {
             "options": np.array([*options, self.engine.name]),
             "seeds": np.array(self.pool.seeds),
+            "starts": np.array(self.pool.digest),
             "worlds": np.array(self.count),
         }
 

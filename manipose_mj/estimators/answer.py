@@ -37,15 +37,23 @@ def checked_answer(answer: Any, mesh: Mapping[str, np.ndarray] | None = None) ->
       EstimatorFailedError: Something is missing, not finite or no rigid transform.
     """
     if isinstance(answer, PoseEstimate):
-        return answer
+        answer = _told(answer) | {"hypotheses": [_told(each) for each in answer.hypotheses]}
     if not isinstance(answer, Mapping):
         raise EstimatorFailedError(f"answered a {type(answer).__name__}; expected a dictionary")
-    others = answer.get("hypotheses", ())
+    others = answer.get("hypotheses")
+    others = () if others is None else others
     if not isinstance(others, list | tuple):
         raise EstimatorFailedError(f"hypotheses are a {type(others).__name__}; expected a list")
     first = _estimate(answer, mesh)
     rest = tuple(_estimate(each, mesh) for each in others)
     return PoseEstimate(first.pose, first.extents, first.confidence, rest)
+
+
+def _told(estimate: PoseEstimate) -> dict[str, Any]:
+    """An estimate as the dictionary that would say it."""
+    known = np.isfinite(estimate.extents).all()
+    extents = estimate.extents if known else None
+    return {"pose": estimate.pose, "score": estimate.confidence, "extents": extents}
 
 
 def _estimate(answer: Mapping[str, Any], mesh: Mapping[str, np.ndarray] | None) -> PoseEstimate:

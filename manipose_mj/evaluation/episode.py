@@ -264,7 +264,7 @@ class _Guarded:
             return getattr(self.policy, method)(*arguments, **named)
         except (InputError, ServerLostError, StageFailure, MemoryError):
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             raise PolicyRaisedError(f"the policy's {method} raised {reason}") from error
 

@@ -99,10 +99,13 @@ def checked_answer(answer: Any, size: int) -> Decision:
             names = ", ".join(map(repr, answer)) or "nothing"
             raise StageFailure("policy", f"the policy answered with {names}; expected 'actions'")
         values = answer["actions"] if "actions" in answer else answer["action"]
-        done = bool(answer.get("done", False))
+        try:
+            done = bool(answer.get("done", False))
+        except Exception:  # of whichever library the value is
+            raise StageFailure("policy", "'done' is neither true nor false") from None
     try:
         actions = np.asarray(values, float)
-    except (TypeError, ValueError):
+    except Exception:  # of whichever library they are
         raise StageFailure("policy", f"the actions are no numbers: {values!r:.80}") from None
     least = 0 if done else 1
     if actions.ndim != 2 or actions.shape[1] != size or len(actions) < least:
@@ -119,5 +122,8 @@ def answered_width(answer: Any) -> int | None:
     values = answer
     if isinstance(answer, Mapping):
         values = answer.get("actions", answer.get("action"))
-    shape = np.shape(values) if isinstance(values, np.ndarray | list | tuple) else ()
+    try:
+        shape = np.shape(values)
+    except Exception:  # rows of different lengths, or of whichever library they are
+        return None
     return shape[1] if len(shape) == 2 else None

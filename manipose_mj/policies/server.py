@@ -74,13 +74,13 @@ class PolicyServer:
             for message in connection:
                 try:
                     with self._one_at_a_time:
-                        answer = _answered(policy, unpack(message))  # type: ignore[arg-type]
+                        answer = pack(_answered(policy, unpack(message)))  # type: ignore[arg-type]
                 except Exception:
                     logger.exception("the policy raised")
                     connection.send(traceback.format_exc())
                     connection.close(1011, "the policy raised; its traceback is the last message")
                     return
-                connection.send(pack(answer))
+                connection.send(answer)
         except ConnectionClosed:
             return
 
@@ -88,7 +88,10 @@ class PolicyServer:
 def _answered(policy: Policy, message: dict[str, Any]) -> dict[str, Any]:
     endpoint = message.pop("endpoint", "infer")
     if endpoint == "infer":
-        return dict(policy.infer(message))
+        answer = policy.infer(message)
+        answer = dict(answer) if isinstance(answer, Mapping) else {"actions": answer}
+        # Of whichever library they are.
+        return {k: np.asarray(v) if k in ("action", "actions") else v for k, v in answer.items()}
     if endpoint != "reset":
         raise ValueError(f"unknown endpoint {endpoint!r}; expected 'infer' or 'reset'")
     space = message["action_space"]

@@ -26,6 +26,6 @@ def new_cache_file(path: Path) -> Iterator[Path]:
             os.replace(scratch / path.name, path)
     except OSError as error:
         raise InputError(
-            f"cannot write the clouds' cache {path.parent}: {error.strerror or error}; "
-            f"set {CACHE_VARIABLE} to a folder with room that can be written"
+            f"cannot write {path}: {error.strerror or error}; choose a folder with room that can be "
+            f"written, for caches by {CACHE_VARIABLE}"
         ) from None

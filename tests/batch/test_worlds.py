@@ -115,6 +115,10 @@ def test_a_saved_state_goes_on_alike_in_other_worlds(worlds, tmp_path):
     equal(found, expected)
     with pytest.raises(InputError, match="its worlds differ"):
         batch.from_pool(worlds.pool, 2, "c").restore(file)
+    moved = [replace(each, simulation=each.simulation + 0.01) for each in worlds.pool.starts]
+    others = batch.from_pool(replace(worlds.pool, starts=tuple(moved)), 3, "c")
+    with pytest.raises(InputError, match="its starts differ"):
+        others.restore(file)
     file.write_bytes(b"nothing")
     with pytest.raises(InputError, match="no state of worlds"):
         other.restore(file)
@@ -163,6 +167,15 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
         worlds.at([7, 8, 9])
     with pytest.raises(InputError, match="needs the number of steps"):
         worlds.rollout(lambda observation, key: None, worlds.at([7, 8, 7]))
+    state = worlds.at([7, 8, 7])
+    for action in (np.zeros((3, 7)), np.zeros((3, 9)), np.zeros((1, 8))):
+        with pytest.raises(InputError, match=r"have shape .* expected \(3, 8\)"):
+            worlds.step(state, action)
+        with pytest.raises(InputError, match=r"have shape .* expected \(3, 8\)"):
+            worlds.rollout(lambda observation, key, action=action: action, state, 2)
+    for hold in (0, -3):
+        with pytest.raises(InputError, match="expected a whole number of control steps"):
+            worlds.step(state, np.zeros((3, 8)), hold)
 
 
 def test_without_a_gpu_one_line_says_what_is_missing():

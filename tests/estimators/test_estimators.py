@@ -18,6 +18,7 @@ from manipose_mj.estimators.view_evaluation import predict_views, view_observati
 from manipose_mj.poses import compose, invert, rotation_about, transform
 from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.data.view_stream import catalogue_views
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from tests.wire.answering import answering
 
 HERE = "tests.estimators.answers"
@@ -231,3 +232,26 @@ def test_settings_are_part_of_what_results_belong_to():
     assert settings.identity == {"name": "a.b:C", "arguments": {"k": 1}, "given CAD": True}
     assert settings.words == ["--estimator", "a.b:C", "--estimator-args", '{"k": 1}', "--give-cad"]
     assert chosen_estimator(None, None, False) is None
+
+
+@pytest.mark.parametrize(
+    ("pose", "confidence", "said"),
+    [
+        (np.full((4, 4), np.nan), 0.5, "pose"),
+        (np.eye(4), np.nan, "score"),
+        (np.eye(4), 2.0, "score is 2"),
+    ],
+)
+def test_an_answer_of_our_own_class_is_checked_as_well(pose, confidence, said):
+    with pytest.raises(EstimatorFailedError, match=said):
+        checked_answer(PoseEstimate(pose, np.full(3, 0.1), confidence))
+
+
+def test_a_right_answer_of_our_own_class_stays_as_it_is():
+    other = PoseEstimate(
+        compose(rotation_about(np.eye(3)[2], 1.0), np.ones(3)), np.full(3, 0.1), 0.2
+    )
+    found = checked_answer(PoseEstimate(np.eye(4), np.full(3, np.nan), 0.5, (other,)))
+    np.testing.assert_array_equal(found.pose, np.eye(4))
+    assert np.isnan(found.extents).all() and found.confidence == 0.5
+    np.testing.assert_allclose(found.hypotheses[0].pose, other.pose)

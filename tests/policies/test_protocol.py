@@ -43,6 +43,8 @@ def test_a_policy_may_be_done_with_or_without_a_last_action():
         ({"actions": np.full((1, 8), np.inf)}, "no finite number"),
         ([[1, 2], [3]], "no numbers"),
         (None, "shape|no numbers"),
+        ([[10**400] * 8], "no numbers"),
+        ({"actions": np.zeros((1, 8)), "done": np.array([True, False])}, "neither true nor false"),
     ],
 )
 def test_other_answers_are_failures_of_the_policy(answer, said):
@@ -57,6 +59,7 @@ def test_the_width_of_an_answer_is_known_where_it_has_one():
     assert answered_width({"actions": np.zeros(7)}) is None
     assert answered_width({"actions": "left"}) is None
     assert answered_width(None) is None
+    assert answered_width({"actions": [[0] * 8, [0] * 7]}) is None
 
 
 def test_policies_are_loaded_by_name_once():
