@@ -138,7 +138,6 @@ def evaluate(
     settings = None if policy == BASELINE else PolicySettings(policy, **given)
     record = out / "exchanges" if planner == "llm" else None
     planning = PlannerSettings(planner, model, base_url, replay, instruction, record)
-    planning.language_model()  # what it lacks is told before anything is written
     config = EvaluationConfig(
         tasks,
         out,

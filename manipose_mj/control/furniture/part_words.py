@@ -22,11 +22,8 @@ _SHARE = 2.0  # how many places the whole height, or width, counts for
 # Of ovens: what it costs to be a knob, to slide, to be below, and to be short beside another bar, in places; handles
 # that are no shorter are bars [m].
 _KNOB, _SLIDES, _BELOW, _SHORT, _BAR = 1.5, 0.3, 1.0, 1.5, 0.06
-
-_WIDE_BAR, _MUCH_SHORTER = (
-    0.3,
-    0.35,
-)  # a bar that is no row of knobs [m], and the share of it that knobs reach
+_WIDE_BAR = 0.3  # no row of knobs seems to be as wide [m]
+_MUCH_SHORTER = 0.35  # share of a wide bar, up to which handles beside it are knobs
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ def meant_part(
 
 
 def _bars_of(candidates: Sequence[Candidate]) -> list[int]:
-    """Beside a wide bar, what is shorter by far is a knob, or a few in a row: indices of the others; none where no bar is wide."""
+    """Indices of what is no knob, nor a few in a row, where a bar is wide: beside it these are shorter by far. None where no bar is."""
     longest = max((candidate.length for candidate in candidates), default=0.0)
     if longest < _WIDE_BAR:
         return []

@@ -21,15 +21,11 @@ from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
 
 
 class TaskPlanner(Protocol):
-    """From goals and an estimate of the scene to plans, whoever makes them.
-
-    Attributes:
-      follows_goals: Whether plans are for the task's goals, and others are asked for until these are met.
-    """
+    """From goals and an estimate of the scene to plans, whoever makes them."""
 
     @property
     def follows_goals(self) -> bool:
-        """As above."""
+        """Whether plans are for the task's goals, and others are asked for until these are met."""
         ...
 
     def name_episode(self, task: str, episode: int) -> None:
