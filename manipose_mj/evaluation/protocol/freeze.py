@@ -1,6 +1,9 @@
 """Writes a protocol's file from the tasks as they are: `python -m manipose_mj.evaluation.protocol.freeze v1`.
 
-For `v1-real`, folders of built assets follow: all that they hold of the three data sets enters.
+Tasks that the file already has keep their seeds, those drawn again too; what follows from the seeds is written anew.
+`--anew` draws every start for the first time instead: certificates of starts drawn again then lapse.
+
+For `v1-real`, folders of built assets follow: all that they hold of the three data sets enters, and every start is new.
 
 Only before a version is released: afterwards a change of any task is a new version.
 """
@@ -26,7 +29,9 @@ from manipose_mj.evaluation.protocol.frozen import (
     VERSIONS,
     digest,
     evaluation_seed,
+    load,
     protocol_path,
+    read_episode,
 )
 from manipose_mj.evaluation.protocol.own_assets import BuiltAsset, built_assets
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
@@ -64,15 +69,28 @@ def frozen_settings(spec: TaskSpec, config: EnvConfig | None = None) -> dict[str
 
 
 def frozen_episodes(
-    version: str, spec: TaskSpec, config: EnvConfig | None = None
+    version: str,
+    spec: TaskSpec,
+    config: EnvConfig | None = None,
+    known: Sequence[Mapping[str, Any]] = (),
 ) -> list[dict[str, Any]]:
-    """The entries of a task's episodes: every group of its objects comes equally often."""
+    """The entries of a task's episodes: every group of its objects comes equally often.
+
+    Args:
+      version: Whose number of episodes it is.
+      spec: The task.
+      config: The environment; by default that of evaluations with built-in assets.
+      known: Entries of the first episodes. What is asked of these stays, their seeds too; what these draw is written anew.
+    """
     scenes = SceneSource(spec, config or evaluation_config(spec))
-    groups = scenes.strata()
+    entries = [
+        frozen_entry(scenes, EpisodeSpec(**read_episode(entry).asked))
+        for entry in known[: EPISODES[version]]
+    ]
+    groups = scenes.strata() if len(entries) < EPISODES[version] else [()]
     if not groups:
         raise InputError("no object is of use")
-    entries = []
-    for i in range(EPISODES[version]):
+    for i in range(len(entries), EPISODES[version]):
         group = groups[i % len(groups)]
         asked = group[i // len(groups) % len(group)]
         seed = evaluation_seed(version, spec.full_name, i)
@@ -93,12 +111,19 @@ def evaluation_config(spec: TaskSpec, objects: Sequence[Asset] | None = None) ->
     return EnvConfig(spec.full_name, obs_mode="state", split="test", objects=objects)
 
 
-def document(version: str) -> dict[str, Any]:
-    """The content of the version's file, from the tasks."""
-    tasks = {
-        spec.full_name: {**frozen_settings(spec), "episodes": frozen_episodes(version, spec)}
-        for spec in builtin_tasks()
-    }
+def document(version: str, before: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The content of the version's file, from the tasks.
+
+    Args:
+      version: Such as `"v1"`.
+      before: The content so far: its tasks keep what is asked of their episodes. None draws all starts for the first time.
+    """
+    known = {} if before is None else before["tasks"]
+    tasks = {}
+    for spec in builtin_tasks():
+        entries = known.get(spec.full_name, {}).get("episodes", ())
+        episodes = frozen_episodes(version, spec, known=entries)
+        tasks[spec.full_name] = {**frozen_settings(spec), "episodes": episodes}
     return stated({"version": version, "tasks": dict(sorted(tasks.items()))})
 
 
@@ -176,13 +201,22 @@ def stated(content: dict[str, Any]) -> dict[str, Any]:
 
 def main(arguments: list[str]) -> int:
     """Write the file of the version named, or of the first; of folders of assets, where some follow."""
-    version, *folders = arguments or [VERSIONS[0]]
+    anew = "--anew" in arguments
+    version, *folders = [each for each in arguments if each != "--anew"] or [VERSIONS[0]]
     if version not in VERSIONS:
         raise unknown_name("protocol", version, VERSIONS)
-    content = document_of_assets(version, built_assets(folders)) if folders else document(version)
+    before = None if anew or not protocol_path(version).exists() else _stored(version)
+    content = (
+        document_of_assets(version, built_assets(folders)) if folders else document(version, before)
+    )
     path = write_protocol(version, content)
     sys.stdout.write(f"{path}: {len(content['tasks'])} tasks, sha256 {content['sha256']}\n")
     return 0
+
+
+def _stored(version: str) -> dict[str, Any]:
+    load(version)  # refuses a file that was edited
+    return json.loads(protocol_path(version).read_text(encoding="utf-8"))
 
 
 def write_protocol(version: str, content: dict[str, Any]) -> Path:

@@ -13,7 +13,7 @@ from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.config import EvaluationConfig
-from manipose_mj.evaluation.protocol import frozen
+from manipose_mj.evaluation.protocol import freeze, frozen
 from manipose_mj.evaluation.protocol.freeze import (
     builtin_tasks,
     evaluation_config,
@@ -57,6 +57,23 @@ def test_a_task_is_as_it_was_frozen(spec):
     for entry in frozen_task["episodes"][:2]:
         asked = EpisodeSpec(**frozen.read_episode(entry).asked)
         assert frozen_entry(scenes, asked) == entry, RULE
+
+
+def test_freezing_again_keeps_starts_that_were_drawn_again(monkeypatch):
+    task = "single_object/position"
+    entries = V1["tasks"][task]["episodes"]
+    redrawn = next(
+        i for i in range(100) if entries[i]["seed"] != frozen.evaluation_seed("v1", task, i)
+    )
+    monkeypatch.setitem(frozen.EPISODES, "v1", redrawn + 1)
+    specs = [s for s in builtin_tasks() if s.full_name == task]
+    monkeypatch.setattr(freeze, "builtin_tasks", lambda: specs)
+    again = freeze.document("v1", V1)
+    assert again["tasks"][task] == {**V1["tasks"][task], "episodes": entries[: redrawn + 1]}
+    first = {"tasks": {task: {**V1["tasks"][task], "episodes": entries[:redrawn]}}}
+    longer = freeze.document("v1", first)["tasks"][task]["episodes"]
+    assert longer[:redrawn] == entries[:redrawn]
+    assert longer[redrawn]["seed"] == frozen.evaluation_seed("v1", task, redrawn)
 
 
 @pytest.mark.parametrize("name", V1["tasks"])
