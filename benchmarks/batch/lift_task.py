@@ -98,7 +98,7 @@ def poses_held_from_above(asset: Asset) -> list[int]:
     count = (asset.grasps.clear.T & (down > FROM_ABOVE)).sum(axis=1)
     held = np.flatnonzero(count >= FEWEST)
     if not len(held):
-        raise InputError(f"{asset.folder}: has no stable pose with {FEWEST} grasps from above")
+        raise InputError(f"{asset.place}: has no stable pose with {FEWEST} grasps from above")
     return held.tolist()
 
 

@@ -91,7 +91,7 @@ def refused(spec: TaskSpec, asked: Sequence[Candidate], split: Split) -> list[Re
 
 
 def cause_of(reason: str, name: str) -> str:
-    """A reason without the object's folder, name and figures."""
+    """A reason without the object's name and figures."""
     if reason.startswith("unknown object"):
         return "its whole category is too long"
     words = re.sub(r"^\S+: ", "", reason).replace(name, "it").split(";")[0]

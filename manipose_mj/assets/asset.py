@@ -18,6 +18,7 @@ from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
+from manipose_mj.storage.cache_root import cache_root
 
 SCHEMA_VERSION = 1
 ASSET_FILE = "asset.json"
@@ -144,6 +145,11 @@ class Asset:
     label_quality: LabelQuality | None = None
 
     @property
+    def place(self) -> str:
+        """How errors call it: its folder, or its name where it is built in, whose folder nobody has chosen."""
+        return self.name if cache_root() in self.folder.parents else str(self.folder)
+
+    @property
     def model_path(self) -> Path:
         """The MJCF file."""
         return self.folder / MODEL_FILE
@@ -170,4 +176,4 @@ class Asset:
             if part.name == name:
                 return part
         known = ", ".join(p.name for p in self.parts) or "none"
-        raise InputError(f"{self.folder}: no moving part {name!r}; parts: {known}")
+        raise InputError(f"{self.place}: no moving part {name!r}; parts: {known}")

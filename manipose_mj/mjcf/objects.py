@@ -23,7 +23,7 @@ class RigidObject(composer.Entity):
 
     def _build(self, asset: Asset, name: str | None = None) -> None:
         if asset.kind != "rigid":
-            raise InputError(f"{asset.folder}: is an {asset.kind} asset; expected a rigid one")
+            raise InputError(f"{asset.place}: is an {asset.kind} asset; expected a rigid one")
         self.asset = asset
         self._mjcf_root = mjcf.from_path(str(asset.model_path))
         self._mjcf_root.model = name or asset.name
@@ -67,9 +67,7 @@ class ArticulatedObject(composer.Entity):
 
     def _build(self, asset: Asset, name: str | None = None) -> None:
         if asset.kind != "articulated":
-            raise InputError(
-                f"{asset.folder}: is a {asset.kind} asset; expected an articulated one"
-            )
+            raise InputError(f"{asset.place}: is a {asset.kind} asset; expected an articulated one")
         self.asset = asset
         self._mjcf_root = mjcf.from_path(str(asset.model_path))
         self._mjcf_root.model = name or asset.name
@@ -111,7 +109,7 @@ class ArticulatedObject(composer.Entity):
         """
         handle = self.asset.part(part).handle
         if handle is None:
-            raise InputError(f"{self.asset.folder}: part {part!r} has no handle label")
+            raise InputError(f"{self.asset.place}: part {part!r} has no handle label")
         return self.part_pose(physics, part) @ handle.pose
 
     def cavity_pose(self, physics: mjcf.Physics, part: str) -> Float[np.ndarray, "4 4"]:
@@ -123,7 +121,7 @@ class ArticulatedObject(composer.Entity):
         cavity = self.asset.part(part).cavity
         if cavity is None:
             raise InputError(
-                f"{self.asset.folder}: part {part!r} has no cavity to store anything in"
+                f"{self.asset.place}: part {part!r} has no cavity to store anything in"
             )
         carrier = (
             self.part_pose(physics, part) if cavity.moves_with_part else self.base_pose(physics)

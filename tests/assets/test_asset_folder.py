@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +32,7 @@ from manipose_mj.assets.geometry import Body, Joint, MassProperties, Shape
 from manipose_mj.assets.label import PoseLabel, symmetry_from_bop, symmetry_to_bop
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
+from manipose_mj.storage.cache_root import CACHE_VARIABLE
 
 TURN = rotation_about(np.array([0.6, 0.0, 0.8]), 0.7)
 MASS = MassProperties(0.5, np.array([0.01, 0.0, -0.02]), np.diag([1e-3, 2e-3, 2.5e-3]))
@@ -125,6 +127,16 @@ def test_an_articulated_asset_reads_back_as_written(tmp_path):
     assert door.handle is None and door.cavity is None
     with pytest.raises(InputError, match="no moving part 'lid'.*drawer, door"):
         back.part("lid")
+
+
+def test_errors_name_a_folder_of_ones_own_and_a_built_in_object(tmp_path, monkeypatch):
+    """The folder of what is built in is the cache's: nobody chose it, and it tells nothing."""
+    own = _cupboard(tmp_path / "assets" / "cupboard")
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    built_in = replace(own, folder=tmp_path / "cache" / "catalogue" / "cabinet-0" / own.name)
+    for asset, place in ((own, str(own.folder)), (built_in, own.name)):
+        with pytest.raises(InputError, match=f"^{re.escape(place)}: no moving part"):
+            asset.part("lid")
 
 
 def test_the_model_loads_alone_from_a_moved_folder_with_the_mass_that_is_said(tmp_path):

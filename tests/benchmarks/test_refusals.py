@@ -6,15 +6,17 @@ from benchmarks.experiments.refusals import Refusal, cause_of, lines_of
 
 
 def test_reasons_are_the_same_for_all_objects():
-    wide = "/cache/{0}: too large for the gripper: {0} is {1} mm wide at its narrowest, the gripper opens 80 mm"
+    wide = "{0}: too large for the gripper: {1} mm wide at its narrowest, the gripper opens 80 mm"
     causes = {cause_of(wide.format(*each), each[0]) for each in (("pot_004", 101), ("pan_004", 99))}
     assert causes == {
-        "too large for the gripper: it is # mm wide at its narrowest, the gripper opens # mm"
+        "too large for the gripper: # mm wide at its narrowest, the gripper opens # mm"
     }
-    fits = "/cache/pot_004: pot_004 measures 10 x 20 x 30 mm and fits the cavity of 'door' (1 x 2 x 3 mm) in no pose"
+    fits = (
+        "pot_004: measures 10 x 20 x 30 mm and fits the cavity of 'door' (1 x 2 x 3 mm) in no pose"
+    )
     assert (
         cause_of(fits, "pot_004")
-        == "it measures # mm and fits the cavity of the part (# mm) in no pose"
+        == "measures # mm and fits the cavity of the part (# mm) in no pose"
     )
     unknown = "unknown object 'pot_004'; did you mean 'pan_004'?"
     assert cause_of(unknown, "pot_004") == "its whole category is too long"

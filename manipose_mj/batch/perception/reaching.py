@@ -70,7 +70,7 @@ def grasp_table(assets: Sequence[Asset], most: int = 64) -> GraspTable:
         grasps = asset.grasps
         narrow = [] if grasps is None else np.flatnonzero(grasps.widths <= MAX_OPENING - _MARGIN)
         if grasps is None or not len(narrow):
-            raise InputError(f"{asset.folder}: has no grasps that the gripper is wide enough for")
+            raise InputError(f"{asset.place}: has no grasps that the gripper is wide enough for")
         chosen = grasps.poses[narrow[:most]]
         poses[row, : len(chosen)] = invert(asset.label.pose) @ chosen
         valid[row, : len(chosen)] = True

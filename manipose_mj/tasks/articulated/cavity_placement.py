@@ -180,7 +180,7 @@ def ways_into(asset: Asset, part: MovingPart) -> tuple[tuple[int, float], ...]:
         lengths = " x ".join(f"{1000 * v:.0f}" for v in asset.label.extents)
         room = " x ".join(f"{1000 * v:.0f}" for v in cavity_of(part).extents)
         raise InputError(
-            f"{asset.folder}: {asset.name} measures {lengths} mm and fits the cavity of "
+            f"{asset.place}: measures {lengths} mm and fits the cavity of "
             f"{part.name!r} ({room} mm) in no stable pose"
         )
     return ways

@@ -66,7 +66,7 @@ class FurnitureDraw:
         names = [each.name for each in possible]
         if part.name not in names:
             raise InputError(
-                f"{asset.folder}: this task is about {', '.join(names)}; part {part.name!r} is none of them"
+                f"{asset.place}: this task is about {', '.join(names)}; part {part.name!r} is none of them"
             )
         return asset, part
 
@@ -98,7 +98,7 @@ def furniture_alone(requested: RequestedFurniture) -> ObjectDrawFactory:
         for asset in env_config.assets() or ():
             if asset.kind != "articulated":
                 raise InputError(
-                    f"{asset.folder}: is a {asset.kind} asset; tasks that open or close take articulated ones"
+                    f"{asset.place}: is a {asset.kind} asset; tasks that open or close take articulated ones"
                 )
         return PieceDraw(requested, env_config, hollow=False)
 

@@ -59,7 +59,7 @@ def possible_parts(asset: Asset, choice: PartChoice, *, hollow: bool) -> tuple[M
       InputError: There is none, or none has a handle or a cavity.
     """
     if asset.kind != "articulated":
-        raise InputError(f"{asset.folder}: is a {asset.kind} asset; expected an articulated one")
+        raise InputError(f"{asset.place}: is a {asset.kind} asset; expected an articulated one")
     known = ", ".join(f"{p.name} ({kind_of(p)})" for p in asset.parts) or "none"
     handled = [part for part in asset.parts if part.handle is not None]
     for kind in choice.kinds:
@@ -73,10 +73,10 @@ def possible_parts(asset: Asset, choice: PartChoice, *, hollow: bool) -> tuple[M
         if not parts:
             names = ", ".join(repr(part.name) for part in found)
             raise InputError(
-                f"{asset.folder}: part {names} opens no cavity; this task needs one to hold things"
+                f"{asset.place}: part {names} opens no cavity; this task needs one to hold things"
             )
         return parts
-    raise InputError(f"{asset.folder}: has no {choice} with a handle; its parts: {known}")
+    raise InputError(f"{asset.place}: has no {choice} with a handle; its parts: {known}")
 
 
 def named_part(asset: Asset, name: str) -> MovingPart:

@@ -99,7 +99,7 @@ def require_fit_for_piles(asset: Asset) -> None:
     longest = float(asset.label.extents.max())
     if longest > LONGEST:
         raise InputError(
-            f"{asset.folder}: {asset.name} is {1000 * longest:.0f} mm long; piles take up to "
+            f"{asset.place}: is {1000 * longest:.0f} mm long; piles take up to "
             f"{1000 * LONGEST:.0f} mm"
         )
     assert asset.grasps is not None
@@ -110,6 +110,6 @@ def require_fit_for_piles(asset: Asset) -> None:
     )
     if share < _OFTEN:
         raise InputError(
-            f"{asset.folder}: {asset.name} mostly falls so that the gripper cannot take it off the table; "
+            f"{asset.place}: mostly falls so that the gripper cannot take it off the table; "
             "piles take objects that it can"
         )

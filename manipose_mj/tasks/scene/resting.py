@@ -28,18 +28,18 @@ def require_graspable(asset: Asset) -> None:
       InputError: It is too wide, or no grasp of it is known.
     """
     if asset.kind != "rigid":
-        raise InputError(f"{asset.folder}: is an {asset.kind} asset; expected a rigid one")
+        raise InputError(f"{asset.place}: is an {asset.kind} asset; expected a rigid one")
     if asset.grasps is not None and asset.grasps.clear.any():
         return
     width, limit = float(min(asset.label.extents)), MAX_OPENING
     if width > limit:
         raise InputError(
-            f"{asset.folder}: too large for the gripper: {asset.name} is {width * 1000:.0f} mm wide "
-            f"at its narrowest, the gripper opens {limit * 1000:.0f} mm"
+            f"{asset.place}: too large for the gripper: {width * 1000:.0f} mm wide at its "
+            f"narrowest, the gripper opens {limit * 1000:.0f} mm"
         )
     raise InputError(
-        f"{asset.folder}: {asset.name} ({width * 1000:.0f} mm wide) has no grasp that is clear of the "
-        "table in any stable pose; choose one that `manipose assets list` shows as graspable"
+        f"{asset.place}: {width * 1000:.0f} mm wide, has no grasp that is clear of the table in any "
+        "stable pose; choose one that `manipose assets list` shows as graspable"
     )
 
 

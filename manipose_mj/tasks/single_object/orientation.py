@@ -87,7 +87,7 @@ def orientation_pairs(asset: Asset, min_turn: float) -> list[tuple[int, int]]:
     pairs = pairs or edge_pairs(asset)
     if not pairs:
         raise InputError(
-            f"{asset.folder}: {asset.name} has no stable pose that the gripper can turn it to "
+            f"{asset.place}: has no stable pose that the gripper can turn it to "
             "from another, or about the vertical; an orientation task needs one"
         )
     return pairs

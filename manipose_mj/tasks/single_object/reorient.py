@@ -74,7 +74,7 @@ def tipped_poses(asset: Asset) -> list[int]:
     """
     if asset.label.object_type not in ("axial", "mirror"):
         raise InputError(
-            f"{asset.folder}: {asset.name} is a {asset.label.object_type} tool, which has no upright; "
+            f"{asset.place}: is a {asset.label.object_type} tool, which has no upright; "
             "expected an axial or mirror-symmetric object"
         )
     upright, needed = upright_poses(asset), placements_between(asset)
@@ -85,7 +85,5 @@ def tipped_poses(asset: Asset) -> list[int]:
         if ups[index] < _TILTED and any(needed[index, goal] >= 0 for goal in upright)
     ]
     if not tipped:
-        raise InputError(
-            f"{asset.folder}: the gripper can set {asset.name} upright from no other stable pose"
-        )
+        raise InputError(f"{asset.place}: the gripper can set it upright from no other stable pose")
     return tipped

@@ -80,7 +80,7 @@ class ShelfSampler:
                 break
         if best is None:
             raise NoStartError(
-                f"{asset.folder}: {asset.name} fits the shelf in no stable pose in which a hand can take it "
+                f"{asset.place}: fits the shelf in no stable pose in which a hand can take it "
                 "at the start and let it go at the goal"
             )
         return best

@@ -115,7 +115,7 @@ def pose_pairs(asset: Asset, config: TargetPoseConfig) -> list[tuple[int, int]]:
                 pairs.append((i, j))
     if not pairs:
         raise InputError(
-            f"{asset.folder}: has no stable pose with {config.min_shared_grasps} grasps for a gripper "
-            "that opens 80 mm; choose an object that `manipose assets list` shows as graspable"
+            f"{asset.place}: has no stable pose with {config.min_shared_grasps} grasps clear of the "
+            "table for a gripper that opens 80 mm; choose another object"
         )
     return pairs

@@ -212,7 +212,7 @@ def test_what_a_task_cannot_use_is_refused_in_one_line():
     with pytest.raises(InputError, match="no bottom drawer"):
         _load("store_bottom_drawer", objects=[catalogue.load("oven", 7)])
     with pytest.raises(
-        InputError, match=r"chips_can_000 measures .* fits the cavity .* no stable pose"
+        InputError, match=r"^chips_can_000: measures .* fits the cavity .* no stable pose"
     ):
         _load("store_cabinet_door", objects=[_shallow(), catalogue.load("chips_can", 0)])
 
