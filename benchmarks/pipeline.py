@@ -1,6 +1,6 @@
 """Build the YCB scans with our pipeline and with obj2mjcf, side by side: objects a minute, fidelity.
 
-    pip install .[bench]
+    pip install -e ".[bench]"
     python benchmarks/pipeline.py FOLDER_OF_YCB_ARCHIVES [--only NAME ...] [--jobs 2] [--json FILE]
 
 Both start from the same textured OBJ files with empty caches and may use the same cores: ours as

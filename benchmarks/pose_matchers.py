@@ -1,7 +1,7 @@
 """Classical matchers of a cloud against one template of its category, for the pose table.
 
 Each matcher is a function from a template to a function from a cloud to `T_camera_label`. Their libraries
-are optional: `pip install 'manipose-mj[pose-bench]'`.
+are optional: `pip install -e ".[pose-bench]"`.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ labels differ from one another, whatever the estimator: the row of what knows ev
 the same of the sources' frames, the best one.
 
 Matchers see the category's typical object as their template, in the right size of its kind, and need
-`pip install 'manipose-mj[pose-bench]'`. Errors are means, medians in brackets; for mugs also as NOCS counts
+`pip install -e ".[pose-bench]"`. Errors are means, medians in brackets; for mugs also as NOCS counts
 (free about the axis while the handle is hidden). Times: one object after another, for networks from bare
 points and on the device that JAX runs on, for matchers on the CPU with normals given. CPPF takes
 seconds an object: all of it about an hour on two cores.

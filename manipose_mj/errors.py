@@ -36,6 +36,11 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     return InputError(f"unknown {kind} {name!r}; known: {', '.join(names) or 'none'}")
 
 
+def how_to_install(extra: str) -> str:
+    """The command that installs an extra of this package, which is on no index, for errors."""
+    return f'pip install -e ".[{extra}]" in the clone of manipose-mj'
+
+
 class WorkerDiedError(RuntimeError):
     """A worker process ended without a result: killed for memory, or crashed in native code.
 

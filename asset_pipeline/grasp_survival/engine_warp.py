@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from asset_pipeline.grasp_survival.grid import TrialGrid
 from asset_pipeline.grasp_survival.trial_model import BODY, GridTrial, motion
 from manipose_mj.assets.physics import GRAVITY
+from manipose_mj.errors import how_to_install
 from manipose_mj.poses import quaternion_to_rotation, rotation_angle
 
 WORLDS = 16384  # at the same time
@@ -20,7 +21,7 @@ def missing_for_warp() -> str:
     """What this machine lacks, and how to get it, in one line; empty if nothing."""
     absent = [n for n in ("warp", "mujoco_warp") if importlib.util.find_spec(n) is None]
     if absent:
-        return f'no module {" and ".join(absent)}; pip install "manipose-mj[gpu]"'
+        return f"no module {' and '.join(absent)}; {how_to_install('gpu')}"
     import warp as wp  # pyright: ignore[reportMissingImports]
 
     if not wp.get_cuda_device_count():

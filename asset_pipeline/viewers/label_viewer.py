@@ -14,7 +14,7 @@ import numpy as np
 from asset_pipeline.viewers.label_scene import LabelScene
 from asset_pipeline.viewers.label_session import OBJECT, LabelSession
 from manipose_mj.assets.symmetry_names import SYMMETRIES, symmetry_name
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, how_to_install
 
 log = logging.getLogger(__name__)
 
@@ -53,9 +53,7 @@ class LabelViewer:
         try:
             import viser  # pyright: ignore[reportMissingImports]
         except ImportError:
-            raise InputError(
-                "the label viewer needs viser; pip install 'manipose-mj[label]'"
-            ) from None
+            raise InputError(f"the label viewer needs viser; {how_to_install('label')}") from None
         self.session = session
         self._lock = threading.RLock()  # viser calls from a pool of threads
         self._updating = False

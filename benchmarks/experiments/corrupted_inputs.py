@@ -1,6 +1,6 @@
 """Build damaged objects of every source, end to end, and count what became of them.
 
-    pip install .[dev]
+    pip install -e ".[dev]"
     python benchmarks/experiments/corrupted_inputs.py [--examples 1000] [--limit-s 60] [--seed 0]
 
 The damages are those of `tests/asset_pipeline/sources/damaged_files.py`: files truncated, emptied, missing, with

@@ -15,7 +15,7 @@ from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, how_to_install, unknown_name
 from manipose_mj.tasks.core.config import EnvConfig, EnvOptions
 
 ENGINES = ("auto", "c", "warp")
@@ -114,7 +114,7 @@ def missing_for_warp() -> str:
     """What the engine `warp` lacks on this machine, and how to get it, in one line; empty if nothing."""
     absent = [n for n in ("warp", "mujoco_warp") if importlib.util.find_spec(n) is None]
     if absent:
-        return f'no module {" and ".join(absent)}; pip install "manipose-mj[gpu]"'
+        return f"no module {' and '.join(absent)}; {how_to_install('gpu')}"
     if jax.default_backend() != "gpu" and not os.environ.get(WARP_ON_CPU):
-        return 'JAX sees no NVIDIA GPU; on a machine with one, pip install "manipose-mj[gpu]"'
+        return f"JAX sees no NVIDIA GPU; on a machine with one, {how_to_install('gpu')}"
     return ""

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from manipose_mj.errors import how_to_install
+
 DISTRIBUTION = "manipose-mj"
-GPU_EXTRA = f'pip install "{DISTRIBUTION}[gpu]"'
-RENDER_EXTRA = f'pip install "{DISTRIBUTION}[render]"'
 _SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
 <body pos="0 0 .5"><freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
 
@@ -50,7 +50,7 @@ def _system() -> Iterator[Finding]:
     try:
         requested = importlib.metadata.metadata(DISTRIBUTION)["Requires-Python"] or ""
     except importlib.metadata.PackageNotFoundError:
-        yield Finding("system", DISTRIBUTION, "missing", "run `pip install .` in its folder")
+        yield Finding("system", DISTRIBUTION, "missing", "run `pip install -e .` in its clone")
         return
     good = SpecifierSet(requested).contains(version)
     yield Finding(
@@ -170,7 +170,7 @@ def _require(*modules: str) -> None:
     for name in modules:
         parent = name.partition(".")[0]
         if importlib.util.find_spec(parent) is None or importlib.util.find_spec(name) is None:
-            raise ModuleNotFoundError(f"{name} is not installed; {GPU_EXTRA}")
+            raise ModuleNotFoundError(f"{name} is not installed; {how_to_install('gpu')}")
 
 
 def _visuals() -> Finding:
@@ -182,7 +182,7 @@ def _visuals() -> Finding:
         return Finding("extras", "Menagerie visuals", "ok", str(folder))
     prefetch = f"{sys.executable} -m mujoco_menagerie prefetch franka_emika_panda"
     if importlib.util.find_spec("mujoco_menagerie") is None:
-        prefetch = f"{RENDER_EXTRA}, then {prefetch}"
+        prefetch = f"{how_to_install('render')}, then {prefetch}"
     return Finding("extras", "Menagerie visuals", "absent", prefetch)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from manipose_mj.errors import InputError, WorkerDiedError
+from manipose_mj.errors import InputError, WorkerDiedError, how_to_install
 
 WAIT_FOR_WORKERS = 10.0  # [s]
 
@@ -27,9 +27,7 @@ def cluster(address: str | None) -> Iterator[None]:
     try:
         from distributed import Client, KilledWorker
     except ImportError:
-        raise InputError(
-            "--dask needs dask.distributed; pip install 'manipose-mj[cluster]'"
-        ) from None
+        raise InputError(f"--dask needs dask.distributed; {how_to_install('cluster')}") from None
     import joblib
 
     try:

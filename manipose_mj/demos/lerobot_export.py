@@ -12,7 +12,7 @@ import numpy as np
 from manipose_mj.demos.layout import RECORDED_HZ, RECORDED_MODE, DemoSet, read_actions
 from manipose_mj.demos.playback import slowed
 from manipose_mj.demos.replay import SteppedPolicy
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, how_to_install
 from manipose_mj.evaluation.episode import environment_of
 from manipose_mj.evaluation.rollout import Rollout, Rules
 from manipose_mj.gym.features import AGENT_NAMES, CAMERAS, IMAGE_SIZE, Features, feature_sensors
@@ -86,7 +86,7 @@ def lerobot_writer(config: ExportConfig, features: dict[str, Any]) -> Writer:
     except ImportError as error:
         reason = " ".join(str(error).split())
         raise InputError(
-            f"the export needs LeRobot ({reason}); install the extra: pip install 'manipose-mj[lerobot]', "
+            f"the export needs LeRobot ({reason}); {how_to_install('lerobot')}, "
             "with Python 3.12 and in an environment of its own"
         ) from None
     return LeRobotDataset.create(

@@ -60,7 +60,7 @@ def test_what_cannot_be_seen_is_refused_in_one_line():
 @pytest.mark.full
 @pytest.mark.parametrize("task", [TASK, "articulated/open_middle_drawer"])
 def test_worlds_with_different_objects_look_as_on_the_cpu(task, monkeypatch):
-    pytest.importorskip("mujoco_warp", reason='needs pip install "manipose-mj[gpu]"')
+    pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
     monkeypatch.setenv("MANIPOSE_WARP_ON_CPU", "1")
     objects = OBJECTS if task == TASK else ("cabinet_018", "cabinet_012")
     pool = batch.make(

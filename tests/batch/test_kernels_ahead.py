@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-wp = pytest.importorskip("warp", reason='needs pip install "manipose-mj[gpu]"')
+wp = pytest.importorskip("warp", reason='needs pip install -e ".[gpu]"')
 
 from manipose_mj.batch.kernels import kernels_ahead  # noqa: E402
 from tests.batch import small_kernels  # noqa: E402

@@ -15,7 +15,7 @@ from manipose_mj.mjcf.panda.servos import Servos
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
-mjx = pytest.importorskip("mujoco.mjx", reason='needs pip install "manipose-mj[gpu]"')
+mjx = pytest.importorskip("mujoco.mjx", reason='needs pip install -e ".[gpu]"')
 pytestmark = pytest.mark.full  # XLA compiles the step
 
 
@@ -58,7 +58,7 @@ def expected(pool, target) -> mujoco.MjData:
 @pytest.mark.parametrize("engine", ["c", "warp"])
 def test_free_motion_is_that_of_mjx(pool, target, expected, engine, monkeypatch):
     if engine == "warp":
-        pytest.importorskip("mujoco_warp", reason='needs pip install "manipose-mj[gpu]"')
+        pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
         monkeypatch.setenv(WARP_ON_CPU, "1")
     worlds = batch.from_pool(pool, 1, engine)
     before = worlds.at(pool.seeds)

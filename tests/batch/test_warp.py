@@ -18,7 +18,7 @@ from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 from tests.batch.batched import wandering
 
-pytest.importorskip("mujoco_warp", reason='needs pip install "manipose-mj[gpu]"')
+pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
 pytestmark = pytest.mark.full  # it compiles for a minute
 STEPS = 8
 

@@ -14,7 +14,7 @@ from manipose_mj.batch.making import WARP_ON_CPU
 from manipose_mj.tasks.core.config import EnvConfig
 from tests.few_objects import few
 
-pytest.importorskip("mujoco_warp", reason='needs pip install "manipose-mj[gpu]"')
+pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
 pytestmark = pytest.mark.full  # each task compiles for some seconds, the first for minutes
 TASKS = ["/".join(task) for task in suite.ALL_TASKS]
 SEEDS, STEPS = (5, 6), 2

@@ -181,6 +181,8 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
 def test_without_a_gpu_one_line_says_what_is_missing():
     if jax.default_backend() == "gpu":
         pytest.skip("there is one")
-    with pytest.raises(InputError, match=r"engine 'warp' cannot run here: .*pip install") as caught:
+    with pytest.raises(
+        InputError, match=r"engine 'warp' cannot run here: .*pip install -e \"\.\[gpu\]\""
+    ) as caught:
         batch.from_pool(Path("nowhere"), 3, "warp")
     assert "\n" not in str(caught.value)

@@ -119,7 +119,7 @@ def test_an_export_without_lerobot_names_the_extra(demos, tmp_path, monkeypatch,
     assert main(["demos", *words]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and "needs LeRobot" in lines[0]
-    assert "pip install 'manipose-mj[lerobot]'" in lines[0]
+    assert 'pip install -e ".[lerobot]"' in lines[0]
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert extras["optional-dependencies"]["lerobot"][0].startswith("lerobot[dataset]>=0.6.1")
     assert not (tmp_path / "set").exists()

@@ -20,7 +20,7 @@ from manipose_mj.control.language.address import (
 )
 from manipose_mj.control.language.completion import answer_in, complaint_in, one_line
 from manipose_mj.control.language.exchanges import Answer, Message, NoReplyError
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, how_to_install
 
 KEY_VARIABLE = "OPENAI_API_KEY"
 URL_VARIABLE = "OPENAI_BASE_URL"
@@ -63,7 +63,7 @@ class EndpointModel:
             import openai
         except ImportError:
             raise InputError(
-                "a language model needs the package openai: pip install 'manipose-mj[llm]'"
+                f"a language model needs the package openai; {how_to_install('llm')}"
             ) from None
         option = URL_VARIABLE if base_url is None else "--base-url"
         base_url = os.environ.get(URL_VARIABLE) or None if base_url is None else base_url

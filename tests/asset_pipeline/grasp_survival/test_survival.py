@@ -107,7 +107,7 @@ def test_wrong_input_is_one_line(tmp_path):
 
 @pytest.mark.full
 def test_engine_warp_comes_to_the_same_verdicts(asset):
-    pytest.importorskip("mujoco_warp", reason='needs pip install "manipose-mj[gpu]"')
+    pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
     from asset_pipeline.grasp_survival.engine_warp import held_warp
 
     grid = trial_grid(asset.grasps, asset.stable_poses, HAND, FEW)

@@ -148,7 +148,7 @@ def test_a_slides_axis_goes_through_its_handle_and_with_it(assets):
 def test_without_viser_the_command_says_what_to_install(assets, capsys, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "viser", None)
     assert main(["assets", "label", str(assets)]) == 2
-    assert "pip install 'manipose-mj[label]'" in capsys.readouterr().err
+    assert 'pip install -e ".[label]"' in capsys.readouterr().err
 
 
 def test_the_page_answers_and_its_buttons_move_and_save(assets):
