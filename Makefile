@@ -40,7 +40,7 @@ conformance: $(VENV)/.conformance
 	$(BIN)/python -m pytest tests/conformance tests/gym
 	$(BIN)/python benchmarks/experiments/random_steps.py
 
-# Stock LeRobot in an environment of its own: 5 GB, Python 3.12. Records, exports, trains for a moment, evaluates.
+# Stock LeRobot in an environment of its own: 6 GB, Python 3.12. Records, exports, trains for a moment, evaluates.
 LEROBOT_PYTHON ?= python3.12
 LEROBOT_VENV ?= .venv-lerobot
 conformance-lerobot:
