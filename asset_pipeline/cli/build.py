@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from manipose_mj.console.cluster import cluster
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 CATALOGUE = "catalogue"
@@ -60,7 +60,7 @@ def build_assets(
       licence: Under which the meshes may be used; without it the assets say that it is unknown.
       object_type: Rule of the label; without it the category's.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from asset_pipeline.build.data_set import OWN, SOURCES, BuildResult, build
     from asset_pipeline.build.workers.limited_call import Limits
     from asset_pipeline.catalogue.parallel_build import build_catalogue

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 
@@ -26,7 +26,7 @@ def check_assets(
       directory: Folder of assets, or one asset's folder.
       jobs: Assets at the same time, one core each.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from rich.table import Table
 
     from asset_pipeline.checks.asset_check import CheckResult, check

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 
 
 def try_grasps(
@@ -32,7 +32,7 @@ def try_grasps(
       seed: Of these errors.
       jobs: Processes of the engine c.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     import numpy as np
     from rich.table import Table
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from manipose_mj.cli.evaluate import run_and_report
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 
 # Of every family, the paper's experiments first.
 TASKS = (
@@ -33,7 +33,7 @@ def demo(
       out: Folder for the report; an earlier demo in it is replaced.
       jobs: Episodes at the same time, one core each.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.protocol import VERSIONS

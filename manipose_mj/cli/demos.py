@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, one_thread_per_process, prepare_workers
 from manipose_mj.errors import InputError
 
 
@@ -46,7 +46,7 @@ def record_demos(
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.assets.categories import category_row, find
     from manipose_mj.cli.builtin_objects import load_objects
     from manipose_mj.cli.evaluate import check_names
@@ -98,7 +98,7 @@ def replay_demos(
       out: Folder for the new files; those that do not succeed any more are left out.
       jobs: Episodes at the same time, one core each.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.console import output
     from manipose_mj.demos.layout import find_sets
     from manipose_mj.demos.replay import ReplayConfig, differing_versions, lost, replay

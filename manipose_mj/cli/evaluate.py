@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from manipose_mj.console.cluster import cluster
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 
@@ -104,7 +104,7 @@ def evaluate(
         cloud; by default annotated with true poses and cloud with estimated ones.
       errors: Made on purpose, to measure what they cost.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.estimators.loading import load_estimator
     from manipose_mj.estimators.settings import chosen_estimator

@@ -8,7 +8,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 _EXIT_FAILED = 1
@@ -45,7 +45,7 @@ def verify_protocol(
       certificates: File of certificates; by default the package's own.
       assets: Folders of assets built from the data sets of v1-real.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import load_certificates
     from manipose_mj.evaluation.certification.search import chosen_starts, verify
@@ -100,7 +100,7 @@ def certify_protocol(
       jobs: Episodes at the same time, one core each.
       assets: Folders of assets built from the data sets of v1-real.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import (
         causes,

@@ -12,7 +12,7 @@ from manipose_mj.console.process import (
     CORES,
     compile_at_once_on_gpus,
     hush_glfw,
-    one_thread_per_process,
+    prepare_workers,
 )
 
 
@@ -56,7 +56,7 @@ def robustness(
       objects: What plans recorded now draw from: names of built-in objects, asset folders, or folders of them.
       jobs: Processes.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     hush_glfw()
     compile_at_once_on_gpus()
     from manipose_mj.batch.making import available_engine, require_worlds

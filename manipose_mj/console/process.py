@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import warnings
 
+from manipose_mj.errors import InputError
+
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -15,6 +17,20 @@ def one_thread_per_process() -> None:
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+
+
+def prepare_workers(jobs: int) -> None:
+    """`one_thread_per_process`, for a command that works on several things at the same time.
+
+    Args:
+      jobs: How many, as its `--jobs` says.
+
+    Raises:
+      InputError: None.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs is {jobs}; expected at least 1")
+    one_thread_per_process()
 
 
 def hush_glfw() -> None:

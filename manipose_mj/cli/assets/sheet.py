@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def draw_sheets(
     """
     if size < 32:
         raise InputError(f"--size is {size}; expected at least 32 pixels")
-    one_thread_per_process()
+    prepare_workers(jobs)
     import joblib
 
     from manipose_mj.console import output

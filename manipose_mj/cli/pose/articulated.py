@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from manipose_mj.cli.pose.train import CURVE_PICTURE, WEIGHTS_FILE, require_positive
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 _CALIBRATION = 320  # clouds that confidence is fitted on
@@ -50,7 +50,7 @@ def train_articulated(
       start_from: Weights of an earlier training to start from, instead of random ones.
       jobs: Processes that render, and beside a GPU make the batches.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     counts = {"asset-scenes": asset_scenes}
     require_positive(minutes, scenes=scenes, batch=batch, steps=steps, **counts)
     if only and assets is None:
@@ -145,7 +145,7 @@ def evaluate_articulated(
       jobs: Processes that render.
       json: Print JSON, for other programs.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     if scenes < 1:
         raise InputError(f"--scenes is {scenes}; expected at least 1")
     from rich.table import Table

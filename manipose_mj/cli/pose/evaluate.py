@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from manipose_mj.cli.pose.train import Name
-from manipose_mj.console.process import CORES, compile_at_once_on_gpus, one_thread_per_process
+from manipose_mj.console.process import CORES, compile_at_once_on_gpus, prepare_workers
 from manipose_mj.errors import InputError
 
 KEPT = 0.8  # share of the views that the estimator is surest of
@@ -53,7 +53,7 @@ def evaluate_pose(
       estimator_args: Keyword arguments of its factory, as a JSON object.
       give_cad: Give it the mesh of the very object that is seen.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     compile_at_once_on_gpus()
     if views < 1:
         raise InputError(f"--views is {views}; expected at least 1")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from manipose_mj.cli.pose.train import Name
-from manipose_mj.console.process import CORES, one_thread_per_process
+from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 
@@ -35,7 +35,7 @@ def export_views(
       views: Of each object.
       jobs: Processes that render.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     if views < 1:
         raise InputError(f"--views is {views}; expected at least 1")
     from manipose_mj.bop.export import export

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from manipose_mj.console.process import CORES, compile_at_once_on_gpus, one_thread_per_process
+from manipose_mj.console.process import CORES, compile_at_once_on_gpus, prepare_workers
 from manipose_mj.errors import InputError
 
 WEIGHTS_FILE, CURVE_PICTURE = "weights.npz", "curve.png"
@@ -72,7 +72,7 @@ def train_pose(
       start_from: Weights of an earlier training to start from, instead of random ones.
       jobs: Processes that render.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     compile_at_once_on_gpus()
     require_positive(minutes, views=views, **{"asset-views": asset_views}, batch=batch, steps=steps)
     for option, count in (("part-swaps", part_swaps), ("asset-part-swaps", asset_part_swaps)):

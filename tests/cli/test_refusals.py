@@ -1,0 +1,44 @@
+"""Numbers that no command can use end in one line, before anything is loaded or written."""
+
+from __future__ import annotations
+
+import pytest
+
+from manipose_mj.cli.main import EXIT_INPUT, main
+
+TASK = "single_object/target_pose"
+IN_PARALLEL = (
+    "demo",
+    f"evaluate {TASK}",
+    f"robustness {TASK}",
+    "protocol verify v1",
+    "protocol certify v1 --out certificates.json",
+    f"demos record {TASK} --out demos",
+    "demos replay demos.h5 --out replayed.h5",
+    "assets build ycb . --out built",
+    "assets check .",
+    "assets grasps .",
+    "assets sheet mug --out mug.png",
+    "pose train mug --out weights",
+    "pose train-articulated --out weights",
+    "pose evaluate mug",
+    "pose evaluate-articulated",
+    "pose export mug --out views",
+)
+
+
+def complaint(capsys) -> str:
+    """What the last command wrote on standard error: one line."""
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    return line.removeprefix("manipose: ")
+
+
+@pytest.mark.parametrize("jobs", [0, -3])
+@pytest.mark.parametrize("command", IN_PARALLEL)
+def test_jobs_are_at_least_one(command, jobs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command.split(), "--jobs", str(jobs)]) == EXIT_INPUT
+    assert complaint(capsys) == f"jobs is {jobs}; expected at least 1"
+    assert not list(tmp_path.iterdir())
