@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_AT_MOST = 60  # names that an error spells out
+
 
 class InputError(ValueError):
     """Input that cannot be used; the message is one line: what, where, and what would be right.
@@ -21,19 +23,26 @@ class ServerAbsentError(InputError):
     """Nobody answers at the address of a method's server, or somebody else does."""
 
 
-def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
-    """An `InputError` for a misspelt name, offering the nearest valid ones.
+def unknown_name(kind: str, name: str, valid: Iterable[str], *, listed_by: str = "") -> InputError:
+    """An `InputError` for a misspelt name, offering the nearest valid ones; where none is near, all, if they are few.
 
     Args:
       kind: What the name stands for, such as `"task"`.
       name: The name as it was given.
       valid: Every name that would have been right.
+      listed_by: Command that lists them, where they are many.
     """
     names = sorted(valid)
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     if near:
         return InputError(f"unknown {kind} {name!r}; did you mean {', '.join(near)}?")
-    return InputError(f"unknown {kind} {name!r}; known: {', '.join(names) or 'none'}")
+    if len(names) <= _AT_MOST:
+        return InputError(f"unknown {kind} {name!r}; known: {', '.join(names) or 'none'}")
+    some = difflib.get_close_matches(name, names, n=3, cutoff=0.0)
+    where = f"; `{listed_by}` lists them" if listed_by else ""
+    return InputError(
+        f"unknown {kind} {name!r}; known are {len(names)}, such as {', '.join(some)}{where}"
+    )
 
 
 def how_to_install(extra: str) -> str:

@@ -75,6 +75,9 @@ def _chosen(only: Sequence[str]) -> dict[str, tuple[str, int]]:
     for name in only:
         own = {n: e for n, e in entries.items() if name in (n, e[0])}
         if not own:
-            raise unknown_name("built-in object or category", name, [*entries, *CATALOGUE])
+            known = [*entries, *CATALOGUE]
+            raise unknown_name(
+                "built-in object or category", name, known, listed_by="manipose list"
+            )
         chosen |= own
     return dict(sorted(chosen.items()))

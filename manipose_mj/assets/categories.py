@@ -162,7 +162,7 @@ def find(name: str) -> tuple[str, int]:
       InputError: There is none; the nearest ones are offered.
     """
     if name not in _by_name():
-        raise unknown_name("built-in object", name, _by_name())
+        raise unknown_name("built-in object", name, _by_name(), listed_by="manipose list")
     return _by_name()[name]
 
 
