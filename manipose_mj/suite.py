@@ -12,7 +12,7 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
-from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions
+from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions, check_seed
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.registry import (
     TaskSpec,
@@ -51,7 +51,8 @@ def load(
         `randomisation`, `sensors`, `latency`.
 
     Raises:
-      InputError: An unknown task, observation or control mode, or objects that the task cannot use.
+      InputError: An unknown task, observation or control mode, objects that the task cannot use, or a number that is no
+        seed.
     """
     spec = task_spec(domain, task)
     return make(EnvConfig(spec.full_name, **config), seed, environment_kwargs=environment_kwargs)
@@ -65,6 +66,8 @@ def make(
 ) -> composer.Environment:
     """The environment that a configuration describes; arguments as for `load`."""
     spec = named_task(config.task)
+    if isinstance(seed, int | float | np.number):
+        check_seed(seed)
     return _made(spec, config, seed, environment_kwargs or {})
 
 

@@ -47,9 +47,10 @@ def render(
     from manipose_mj.mjcf.cameras.pictures import render as draw
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
+    episode = EpisodeSpec(seed)
     with output.working_on("drawing"):
         config = EnvConfig(task, obs_mode="state", objects=objects or None)
-        model, data = start_state(config, EpisodeSpec(seed))
+        model, data = start_state(config, episode)
         picture = draw(model, data, camera, height, width, engine="auto")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -34,8 +34,9 @@ def view(
     from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
+    episode = EpisodeSpec(seed)
     environment = suite.make(EnvConfig(task, obs_mode="state", objects=objects or None))
-    environment.reset(EpisodeSpec(seed))
+    environment.reset(episode)
     action = np.append(HOME, MAX_OPENING)
     physics = environment.physics
     with open_viewer(physics.model.ptr, physics.data.ptr) as window:

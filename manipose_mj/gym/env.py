@@ -13,10 +13,10 @@ from gymnasium.wrappers.utils import rescale_box
 
 from manipose_mj import suite
 from manipose_mj.actions import checked_action
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
-from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, EpisodeSpec
+from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, EpisodeSpec, check_seed
 from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.registry import TaskSpec, named_task
 from manipose_mj.tasks.goals import Goal, success
@@ -24,7 +24,6 @@ from manipose_mj.tasks.instructions.sentence import instruction
 from manipose_mj.tasks.scene.state import SceneState
 
 Observation = dict[str, np.ndarray]
-_SEEDS = 2**32
 RESET_OPTIONS = ("object", "furniture", "part", "goal", "start_index")
 _ignored: set[str] = set()  # reset options that were warned of
 
@@ -216,9 +215,8 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
             f"reset option {name!r} is unknown and ignored; known: {', '.join(RESET_OPTIONS)}"
         )
     index = asked.pop("start_index", None)
-    for what, number in (("seed", seed), ("start_index", index)):
-        if number is not None and not 0 <= number < _SEEDS:
-            raise InputError(f"{what} is {number}; expected 0 to {_SEEDS - 1}")
+    if index is not None:
+        check_seed(index, "start_index")
     if "goal" in asked:
         pose = np.asarray(asked["goal"], float)
         check_pose(pose)

@@ -42,3 +42,10 @@ def test_jobs_are_at_least_one(command, jobs, tmp_path, monkeypatch, capsys):
     assert main([*command.split(), "--jobs", str(jobs)]) == EXIT_INPUT
     assert complaint(capsys) == f"jobs is {jobs}; expected at least 1"
     assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_of_no_seed_leaves_no_file(tmp_path, capsys):
+    out = tmp_path / "a.png"
+    assert main(["render", TASK, "--out", str(out), "--seed", "-1"]) == EXIT_INPUT
+    assert complaint(capsys) == "seed is -1; expected a whole number from 0 to 4294967295"
+    assert not out.exists()

@@ -21,6 +21,7 @@ _log = logging.getLogger(__name__)
 
 Engine = Literal["auto", "gl", "ray"]
 ENGINES: tuple[str, ...] = ("auto", "gl", "ray")
+MOST_PIXELS = 2**26  # a square of 8192: rays take gigabytes beyond
 
 
 class Painter(Protocol):
@@ -55,7 +56,7 @@ def render(
       engine: "gl" for MuJoCo's renderer, "ray" for ours, "auto" for GL if it works here.
 
     Raises:
-      InputError: No such camera or engine, or GL was asked for and does not work.
+      InputError: No such camera or engine, a size that cannot be drawn, or GL was asked for and does not work.
     """
     with painter(model, height, width, engine=engine) as paint:
         return paint.paint(data, camera)
@@ -96,9 +97,19 @@ def make_painter(
         raise unknown_name("engine", engine, ENGINES)
     if height < 1 or width < 1:
         raise InputError(f"picture size {height} x {width}: height and width must be positive")
-    if binds_gl(engine):
-        return _GLPainter(model, height, width, groups)
-    return RayPainter(model, height, width, shading, groups=groups)
+    if height * width > MOST_PIXELS:
+        raise InputError(
+            f"picture size {height} x {width}: expected at most {MOST_PIXELS} pixels, as of 8192 x 8192"
+        )
+    try:
+        if binds_gl(engine):
+            return _GLPainter(model, height, width, groups)
+        return RayPainter(model, height, width, shading, groups=groups)
+    except (mujoco.FatalError, MemoryError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(
+            f"picture size {height} x {width}: cannot be drawn here ({reason}); choose a smaller one"
+        ) from None
 
 
 def binds_gl(engine: Engine) -> bool:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict
 
+import numpy as np
+
 from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
@@ -19,6 +21,7 @@ from manipose_mj.tasks.observations.sensors import parse_modes
 
 REWARD_MODES: tuple[RewardMode, ...] = ("sparse", "dense")
 PRIMITIVE = "primitive"
+SEEDS = 2**32  # of episodes: those of `numpy.random.RandomState`
 Objects = Sequence[Asset | str | Path]
 
 
@@ -104,6 +107,9 @@ class EpisodeSpec:
       furniture: Name of the articulated asset, likewise.
       part: Name of the drawer or door that it shall be about, likewise.
       goal: `T_world_label` that the object shall have in the end, rows of a `(4, 4)` matrix; None draws it.
+
+    Raises:
+      InputError: The seed is no whole number from 0 to 2**32 - 1.
     """
 
     seed: int | None = None
@@ -111,6 +117,17 @@ class EpisodeSpec:
     furniture: str | None = None
     part: str | None = None
     goal: tuple[tuple[float, ...], ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.seed is not None:
+            check_seed(self.seed)
+
+
+def check_seed(seed: Any, what: str = "seed") -> None:
+    """Raises InputError for what is no seed of an episode; `what` names it in the message."""
+    whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+    if not whole or not 0 <= seed < SEEDS:
+        raise InputError(f"{what} is {seed!r}; expected a whole number from 0 to {SEEDS - 1}")
 
 
 @dataclass(frozen=True)

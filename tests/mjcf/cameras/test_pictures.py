@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.cameras import gl
+from manipose_mj.mjcf.cameras import gl, pictures
 from manipose_mj.mjcf.cameras.pictures import painter, render
 from manipose_mj.mjcf.cameras.ray_picture import RayPainter, RayShading
 from manipose_mj.mjcf.cameras.surface_colours import SurfaceColours, to_linear
@@ -164,6 +164,21 @@ def test_auto_draws_without_gl(scene, monkeypatch):
     np.testing.assert_array_equal(render(*scene, "top", 30, 40, engine="auto"), expected)
     with pytest.raises(InputError, match="MUJOCO_GL"):
         render(*scene, "top", 30, 40, engine="gl")
+
+
+def test_sizes_beyond_memory_are_refused(scene):
+    with pytest.raises(InputError, match="at most 67108864 pixels"):
+        render(*scene, "top", 20_000, 20_000, engine="ray")
+
+
+def test_sizes_beyond_the_renderers_buffer_are_refused(scene, monkeypatch):
+    def no_room(*size):
+        raise mujoco.FatalError("Offscreen framebuffer is not complete, error 0x8cd6")
+
+    monkeypatch.setattr(pictures, "binds_gl", lambda engine: True)
+    monkeypatch.setattr(mujoco, "Renderer", no_room)
+    with pytest.raises(InputError, match=r"480 x 50000: cannot be drawn here .* a smaller one"):
+        render(*scene, "top", 480, 50_000, engine="gl")
 
 
 def test_bad_input(scene):
