@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -58,8 +59,8 @@ def batched_results(
     """The results of episodes, by task and index, a batch of worlds after the other.
 
     Raises:
-      InputError: The policy cannot act in many worlds, its rate does not divide the control steps', or the engine
-        cannot run here.
+      InputError: The policy cannot act in many worlds, or fails at it, its rate does not divide the control steps', or
+        the engine cannot run here.
     """
     settings = config.policy
     assert settings is not None, "batched worlds play policies"
@@ -111,7 +112,8 @@ def _tell(policy: Any, worlds: Worlds, settings: PolicySettings, task: str) -> N
         worlds.pool.layout.control_mode,
         settings.hz,
     )
-    policy.reset(task=task, instruction="", seed=0, action_space=space)
+    with _naming(settings.name, "reset"):
+        policy.reset(task=task, instruction="", seed=0, action_space=space)
 
 
 def _played(
@@ -120,7 +122,7 @@ def _played(
     """Play until all episodes of these seeds have ended."""
     horizon = worlds.pool.layout.horizon
     enough = round(SUCCESS_HELD * CONTROL_HZ) if settings.stop == "success" else horizon + 1
-    several = _several(worlds, policy, hold)
+    several = _several(worlds, policy, settings.name, hold)
     state, ends = worlds.at(seeds), _no_ends(worlds.count)
     taken = 0
     while not ends.ended.all():
@@ -146,18 +148,36 @@ _LOOKED_AT = ("terminated", "truncated", "success", "success_once", "overflowed"
 
 
 def _several(
-    worlds: Worlds, policy: BatchPolicy, hold: int
+    worlds: Worlds, policy: BatchPolicy, name: str, hold: int
 ) -> Callable[[State], tuple[State, Any]]:
     """Some actions in one call, with what each led to."""
+    shape = (worlds.count, len(worlds.lower))
 
     def one(state: State, _: None) -> tuple[State, Any]:
-        action = policy.act(state.observation)
+        with _naming(name, "act"):
+            action = jnp.asarray(policy.act(state.observation))
+        if action.shape != shape:
+            raise InputError(
+                f"--policy {name}: act answered with shape {action.shape}; expected {shape}, worlds and numbers of an action"
+            )
         beyond = jnp.abs(jnp.clip(action, worlds.lower, worlds.upper) - action).max(-1)
         after = worlds.step(state, action, hold)
         looks = {name: getattr(after, name) for name in _LOOKED_AT}
         return after, (looks, beyond > ROUNDING)
 
     return jax.jit(lambda state: jax.lax.scan(one, state, length=_LOOK_EVERY))
+
+
+@contextmanager
+def _naming(policy: str, method: str) -> Iterator[None]:
+    """Whatever a stranger's method raises, as an `InputError` that names the policy."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"--policy {policy}: {method} failed ({reason[:300]})") from error
 
 
 def _unstacked(looks: Mapping[str, Array]) -> list[dict[str, np.ndarray]]:

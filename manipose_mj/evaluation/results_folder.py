@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,7 +19,11 @@ RUN_FILE = "run.json"
 
 @contextmanager
 def results_file(out: Path) -> Iterator[IO[bytes]]:
-    """The open and locked results file; a disk that refuses becomes an `InputError`."""
+    """The open and locked results file; a disk that refuses becomes an `InputError`.
+
+    One that ends the evaluation before its first result leaves no file behind, nor the folder if it is new.
+    """
+    new = not out.exists()
     try:
         out.mkdir(parents=True, exist_ok=True)
         file = (out / RESULTS_FILE).open("ab")
@@ -29,7 +33,11 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
     try:
         with file:
             _lock(file, out)
-            yield file
+            try:
+                yield file
+            except InputError:
+                _remove_if_empty(file, out, new)
+                raise
     except OSError as error:
         if error.filename is not None and not str(error.filename).startswith(str(out)):
             raise
@@ -37,6 +45,17 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
             f"{out}: cannot write results there ({error.strerror or error}); "
             "those of finished episodes are safe: make room, then --resume goes on"
         ) from None
+
+
+def _remove_if_empty(file: IO[bytes], out: Path, new: bool) -> None:
+    """Undo an evaluation that has no result."""
+    if os.fstat(file.fileno()).st_size:
+        return
+    for name in (RESULTS_FILE, RUN_FILE):
+        (out / name).unlink(missing_ok=True)
+    if new:
+        with suppress(OSError):  # somebody else's file is there
+            out.rmdir()
 
 
 def _lock(file: IO[bytes], out: Path) -> None:

@@ -59,6 +59,27 @@ class Alone:
         return {"actions": np.zeros((1, 8))}
 
 
+class Raising(Alone):
+    """A policy with a mistake in it."""
+
+    def act(self, observation):
+        raise KeyError("weights")
+
+
+class Narrow(Alone):
+    """A policy that leaves the gripper out."""
+
+    def act(self, observation):
+        return jnp.zeros((2, 6))
+
+
+class Unready(Puller):
+    """A policy that cannot begin."""
+
+    def reset(self, **episode):
+        raise RuntimeError("no\nweights")
+
+
 def config(out: Path, policy: str, batch: BatchSettings | None, **changes) -> EvaluationConfig:
     settings = {"obs_mode": "state+pose", "control_mode": "pd_ee_pose", "hz": 5.0}
     return EvaluationConfig(
@@ -96,6 +117,22 @@ def test_policies_that_act_in_one_world_and_odd_rates_are_refused(tmp_path):
         asked = config(tmp_path, policy, batch, **changes)
         with pytest.raises(InputError, match=said):
             list(batched_results(asked, batch, [(TASK, 0)]))
+
+
+@pytest.mark.parametrize(
+    ("policy", "said"),
+    [
+        ("Raising", r"Raising: act failed \(KeyError: 'weights'\)"),
+        ("Narrow", r"Narrow: act answered with shape \(2, 6\); expected \(2, 7\)"),
+        ("Unready", r"Unready: reset failed \(RuntimeError: no weights\)"),
+        ("Alone", "has no method act"),
+    ],
+)
+def test_a_refused_policy_is_named_and_leaves_no_results(policy, said, tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=said):
+        evaluate(config(out, policy, BatchSettings("c", 2)))
+    assert not out.exists()
 
 
 def test_worlds_need_an_engine_and_a_policy(tmp_path, capsys):
