@@ -113,8 +113,13 @@ class EvaluationConfig:
             raise InputError(
                 f"planner {self.planner.kind!r} is of the baseline; leave it out with a policy"
             )
-        if self.resample is not None and (self.protocol is None or self.resample < 0):
-            raise InputError(f"resample {self.resample}: expected 0 or more, and a protocol")
+        if self.resample is not None and self.protocol is None:
+            raise InputError(
+                f"resample {self.resample}: there is no protocol whose seeds it replaces; "
+                f"add --protocol {protocol.VERSIONS[0]}, or choose episodes by --seed"
+            )
+        if self.resample is not None and not _is_base_seed(self.resample):
+            raise InputError(f"resample is {self.resample!r}; expected a whole number, at least 0")
         if self.estimator is not None and self.pose == "oracle":
             raise InputError("an estimator needs --pose estimated: nobody else asks for estimates")
         if self.batch is not None:
@@ -171,7 +176,11 @@ class EvaluationConfig:
                 f"protocol {self.protocol} fixes seeds and objects; leave out seed and objects"
             )
         for task in self.tasks:
-            frozen.episode(task, self.episodes - 1)
+            known = len(frozen.task(task).episodes)
+            if self.episodes > known:
+                raise InputError(
+                    f"episodes is {self.episodes}; protocol {self.protocol} has {known} episodes of {task}"
+                )
         if self.assets and not frozen.sources:
             raise InputError(
                 f"protocol {self.protocol} has built-in objects only; leave out --assets"
@@ -309,6 +318,10 @@ class EvaluationConfig:
         if self.dask is not None:
             words += ["--dask", self.dask]
         return shlex.join(words)
+
+
+def _is_base_seed(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def episode_seed(seed: int, task: str, episode: int) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from manipose_mj.errors import ServerAbsentError, ServerLostError
+from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError
 from manipose_mj.wire.framing import pack, unpack
 
 SCHEMES = ("ws://", "wss://")
@@ -31,7 +31,15 @@ class RemoteFailureError(RuntimeError):
 
 
 def is_address(reference: str) -> bool:
-    """Whether a reference names a server rather than a Python object."""
+    """Whether a reference names a server rather than a Python object.
+
+    Raises:
+      InputError: It is an address of another scheme.
+    """
+    if "://" in reference and not reference.startswith(SCHEMES):
+        raise InputError(
+            f"{reference}: servers of methods have addresses with {' or '.join(SCHEMES)}, such as ws://localhost:8000"
+        )
     return reference.startswith(SCHEMES)
 
 

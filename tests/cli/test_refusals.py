@@ -49,3 +49,27 @@ def test_a_picture_of_no_seed_leaves_no_file(tmp_path, capsys):
     assert main(["render", TASK, "--out", str(out), "--seed", "-1"]) == EXIT_INPUT
     assert complaint(capsys) == "seed is -1; expected a whole number from 0 to 4294967295"
     assert not out.exists()
+
+
+SERVERS = "servers of methods have addresses with ws:// or wss://"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ("--policy http://localhost:8000", SERVERS),
+        ("--pose estimated --estimator http://localhost:8000", SERVERS),
+        (
+            "--protocol v1 --episodes 101",
+            f"episodes is 101; protocol v1 has 100 episodes of {TASK}",
+        ),
+        ("--resample 3", "resample 3: there is no protocol whose seeds it replaces"),
+        ("--protocol v1 --resample -3", "resample is -3; expected a whole number, at least 0"),
+    ],
+)
+def test_evaluations_that_cannot_be_leave_no_folder(wrong, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("manipose_mj.cli.builtin_objects.load_objects", lambda names, jobs: [])
+    out = tmp_path / "out"
+    assert main(f"evaluate {TASK} --jobs 1 --out {out} {wrong}".split()) == EXIT_INPUT
+    assert said in complaint(capsys)
+    assert not out.exists()
