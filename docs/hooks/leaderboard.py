@@ -38,7 +38,12 @@ def tables(folder: Path = LEADERBOARD) -> str:
 def _method(text: str) -> str:
     """What `card.md` says of the method, for a cell of a table."""
     (line,) = [each for each in text.splitlines() if each.startswith(METHOD)]
-    return line.removeprefix(METHOD).replace("|", "\\|")
+    return _cell(line.removeprefix(METHOD))
+
+
+def _cell(text: str) -> str:
+    """Text that ends no cell of a table."""
+    return text.replace("|", "\\|")
 
 
 def _row(card: dict[str, Any], run: dict[str, Any], method: str) -> str:
@@ -49,7 +54,7 @@ def _row(card: dict[str, Any], run: dict[str, Any], method: str) -> str:
     url = card["code_url"]
     name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
     return (
-        f"| {name} | {run['protocol']}, {seeds} | {covered} | {episodes} | "
+        f"| {_cell(name)} | {run['protocol']}, {seeds} | {covered} | {episodes} | "
         f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {method} | "
-        f"{card['training_data']} |"
+        f"{_cell(card['training_data'])} |"
     )

@@ -219,7 +219,7 @@ def _result(
         object=task.object_name,
         pose_source=naming.pose_source,
         mask_source=naming.mask_source,
-        success_once=task.success_once,
+        success_once=task.success_once or success,
         success_at_end=success,
         failure=None if success or failure is None else failure.stage,
         reason="" if success or failure is None else failure.reason,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import zipfile
 from collections.abc import Iterable
@@ -127,13 +128,30 @@ def from_line(line: str) -> EpisodeResult:
     """The result that `to_line` wrote.
 
     Raises:
-      ValueError: The line is not one whole record.
+      ValueError: The line is not one whole record, a value is of another type than its field, or the episode succeeded
+        at its end and never.
     """
     document = json.loads(line)
     names = [f.name for f in fields(EpisodeResult)]
     if not isinstance(document, dict) or sorted({**_SINCE, **document}) != sorted(names):
         raise ValueError(f"expected an object with the fields {', '.join(names)}")
+    for field in fields(EpisodeResult):
+        value = document.get(field.name, _SINCE.get(field.name))
+        if not any(_is_of(value, kind) for kind in str(field.type).split(" | ")):
+            raise ValueError(f"{field.name} is {value!r:.80}; expected {field.type}")
+    if document["success_at_end"] and not document["success_once"]:
+        raise ValueError("success_at_end is true and success_once is not")
     return EpisodeResult(**document)
+
+
+def _is_of(value: Any, kind: str) -> bool:
+    """Whether a JSON value is of the type that a field's annotation names."""
+    if isinstance(value, bool):
+        return kind == "bool"
+    if kind == "float":
+        return isinstance(value, int | float) and math.isfinite(value)
+    kinds: dict[str, type] = {"str": str, "int": int, "None": type(None)}
+    return kind in kinds and isinstance(value, kinds[kind])
 
 
 def read_results(path: Path) -> tuple[list[EpisodeResult], int]:

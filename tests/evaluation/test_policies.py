@@ -324,7 +324,7 @@ POLICY = f"evaluate {TASK} --jobs 1 --out {{tmp}}/out --policy {HERE}:Reaching"
         (f"{POLICY} --pose estimated", "leave it out with a policy"),
         (f"{POLICY} --obs-format droid --obs-mode state", "add --obs-mode state+rgb"),
         (f"{POLICY} --policy-args [1]", "expected a JSON object"),
-        (f"{POLICY} --resample 3", "and a protocol"),
+        (f"{POLICY} --resample 3", "there is no protocol whose seeds it replaces"),
         (f"evaluate {TASK} --hz 5", "hz: for a policy only"),
     ],
 )

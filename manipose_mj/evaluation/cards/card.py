@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -43,10 +44,12 @@ class About:
 
     def __post_init__(self) -> None:
         for field, value in asdict(self).items():
-            if not isinstance(value, str) or not value.strip() or "\n" in value:
+            if not isinstance(value, str) or not value.strip() or len(value.splitlines()) > 1:
                 raise InputError(f"{field} is {value!r}; expected one line of text")
-        if not self.code_url.startswith("https://") and self.code_url != OWN_CODE:
-            raise InputError(f"code_url is {self.code_url!r}; expected https://... or {OWN_CODE!r}")
+        if not re.fullmatch(r"https://\S+", self.code_url) and self.code_url != OWN_CODE:
+            raise InputError(
+                f"code_url is {self.code_url!r}; expected https://... without blanks, or {OWN_CODE!r}"
+            )
 
 
 def make_card(folders: Sequence[Path], about: About, out: Path | None = None) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,48 @@ from manipose_mj.evaluation.cards.method import NEEDED, sources_of
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import EpisodeResult, read_results
 from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _holds(value: Any, *names: str) -> bool:
+    """Whether it is an object with texts of these names."""
+    return isinstance(value, dict) and all(isinstance(value.get(name), str) for name in names)
+
+
+def _is_planner(value: Any) -> bool:
+    more = {"rules": (), "llm": ("model",), "replay": ("replay sha256",)}
+    return _holds(value, "kind") and value["kind"] in more and _holds(value, *more[value["kind"]])
+
+
+# Of what a card tells, and seeds depend on: what it has to be, in words and as a test.
+_FORMS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+    "tasks": (
+        "a list of names",
+        lambda value: isinstance(value, list) and all(isinstance(each, str) for each in value),
+    ),
+    "episodes": ("a whole number", _whole),
+    "resample": ("null or a whole number", lambda value: value is None or _whole(value)),
+    "pose": ("a name", lambda value: isinstance(value, str)),
+    "policy": (
+        "null or an object with name and obs_mode",
+        lambda value: value is None or _holds(value, "name", "obs_mode"),
+    ),
+    "planner": ("an object with the kind rules, llm or replay, and what that needs", _is_planner),
+    "estimator": (
+        "null or an object with a name",
+        lambda value: value is None or _holds(value, "name"),
+    ),
+    "batch": (
+        "null or an object with an engine",
+        lambda value: value is None or _holds(value, "engine"),
+    ),
+    "assets sha256": ("null or a text", lambda value: isinstance(value, str | None)),
+    "injected errors": ("null or an object", lambda value: isinstance(value, dict | None)),
+    "grasps": ("null or a name", lambda value: isinstance(value, str | None)),
+}
 
 
 @dataclass(frozen=True)
@@ -65,7 +107,10 @@ def _run_file(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: no run of a protocol; a card is of `manipose evaluate --protocol v1`"
         )
-    frozen = protocol.load(run["protocol"])
+    try:
+        frozen = protocol.load(str(run["protocol"]))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     if run.get("protocol sha256") != frozen.sha256:
         raise InputError(
             f"{path}: protocol {frozen.version} has sha256 {frozen.sha256[:12]}..., "
@@ -76,6 +121,9 @@ def _run_file(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: lacks {missing[0]!r}, so that it does not tell its method; evaluate again"
         )
+    for name, (expected, fits) in _FORMS.items():
+        if name in run and not fits(run[name]):
+            raise InputError(f"{path}: {name} is {run[name]!r:.80}; expected {expected}")
     return run
 
 
@@ -110,6 +158,8 @@ def _config(folder: Path, run: dict[str, Any]) -> EvaluationConfig:
         )
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder / RUN_FILE}: cannot be read as a run ({error!r})") from None
+    except InputError as error:
+        raise InputError(f"{folder / RUN_FILE}: {error}") from None
 
 
 def _check_episodes(path: Path, config: EvaluationConfig, results: Sequence[EpisodeResult]) -> None:

@@ -52,6 +52,13 @@ def test_the_page_shows_every_card(hook):
             assert f"results sha256 `{run['results_sha256'][:16]}`" in shown
 
 
+def test_bars_in_what_makers_say_end_no_cell(hook):
+    card = {"name": "a|b", "code_url": "https://a.org/", "training_data": "c | d"}
+    run = json.loads((CARDS[0] / "card.json").read_text(encoding="utf-8"))["runs"][0]
+    row = hook._row(card, run, "method")
+    assert row.startswith("| [a\\|b](https://a.org/) | ") and row.endswith(" | c \\| d |")
+
+
 def test_other_pages_stay_as_they_are(hook):
     page = SimpleNamespace(file=SimpleNamespace(src_uri="index.md"))
     assert hook.on_page_markdown(f"a {hook.PLACE}", page) == f"a {hook.PLACE}"

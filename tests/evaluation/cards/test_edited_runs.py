@@ -1,0 +1,84 @@
+"""A run whose files were edited is refused in one line that names the file and the field."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from manipose_mj.errors import InputError
+from manipose_mj.evaluation.cards.card import About
+from manipose_mj.evaluation.cards.run_record import read_run
+from tests.evaluation.cards.test_cards import evaluated
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Path:
+    return evaluated(tmp_path_factory.mktemp("runs") / "run")
+
+
+@pytest.fixture
+def run(whole, tmp_path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "run"))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("protocol", ["v1"], "unknown protocol"),
+        ("tasks", 3, "expected a list of names"),
+        ("tasks", ["single_object/none"], "unknown task of protocol v1"),
+        ("episodes", 6.0, "expected a whole number"),
+        ("episodes", 101, "protocol v1 has 100 episodes"),
+        ("resample", 1.5, "expected null or a whole number"),
+        ("resample", -1, "expected a whole number, at least 0"),
+        ("pose", [], "expected a name"),
+        ("policy", "a:B", "expected null or an object with name and obs_mode"),
+        ("planner", None, "expected an object with the kind rules, llm or replay"),
+        ("planner", {"kind": "llm"}, "and what that needs"),
+        ("estimator", 1, "expected null or an object with a name"),
+        ("batch", {"worlds": 2}, "expected null or an object with an engine"),
+        ("assets sha256", 1, "expected null or a text"),
+        ("injected errors", [1], "expected null or an object"),
+        ("grasps", {}, "expected null or a name"),
+    ],
+)
+def test_a_field_of_another_form_is_named(run, field, value, said):
+    path = run / "run.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {field: value}))
+    with pytest.raises(InputError) as refusal:
+        read_run(run)
+    message = str(refusal.value)
+    assert message.startswith(f"{path}: ") and said in message and "\n" not in message
+    assert field.split()[0].removesuffix("s") in message
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("task", [], "task is []; expected str"),
+        ("episode", True, "episode is True; expected int"),
+        ("success_once", None, "success_once is None; expected bool"),
+        ("translation_error", "none", "translation_error is 'none'; expected float | None"),
+        ("wall_s", float("nan"), "wall_s is nan; expected float"),
+        ("decisions", 1.5, "decisions is 1.5; expected int"),
+        ("success_once", False, "success_at_end is true and success_once is not"),
+    ],
+)
+def test_a_value_of_another_type_is_named_with_its_line(run, field, value, said):
+    path = run / "results.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    number = next(i for i, line in enumerate(lines) if line["success_at_end"])
+    lines[number][field] = value
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(InputError) as refusal:
+        read_run(run)
+    assert str(refusal.value) == f"{path}: line {number + 1} is not an episode's result: {said}"
+
+
+@pytest.mark.parametrize("url", ["https://", "https://a.org/my code", "https://a.org/\tb"])
+def test_an_address_of_code_has_no_blanks(url):
+    with pytest.raises(InputError, match="without blanks"):
+        About("ours", url, "none")
