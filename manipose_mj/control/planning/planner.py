@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import Protocol, get_args
 
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Plan
@@ -17,7 +17,8 @@ from manipose_mj.control.planning.plan_articulated import (
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
-from manipose_mj.tasks.goals import Goal, InsideGoal, TakenOutGoal
+from manipose_mj.errors import InputError
+from manipose_mj.tasks.goals import Goal, InsideGoal, OnTableGoal, TakenOutGoal
 
 
 class TaskPlanner(Protocol):
@@ -91,8 +92,8 @@ def candidate_plans(
       planner: Of motions in the scene of `estimate`; without one nothing is set down on the way.
 
     Raises:
-      InputError: On the way through them. A goal names something that is not there, an object fits
-        a cavity in no orientation, or in clutter there are no more.
+      InputError: On the way through them. A goal is of a kind that has no plan or names something that is not there,
+        an object fits a cavity in no orientation, or in clutter there are no more.
     """
     if planner is not None and in_clutter(goals, estimate):
         yield from candidate_moves(goals, estimate, planner)
@@ -125,6 +126,11 @@ def _plans_of_each(
             plans.append(part_goal_plans(goal, estimate, planner, opened))
             if isinstance(goal, InsideGoal | TakenOutGoal) and leads_through(goal, estimate):
                 opened |= {goal.part}
+        elif not isinstance(goal, OnTableGoal):  # which moves keep to by themselves
+            known = ", ".join(kind.__name__ for kind in (*get_args(RestGoal), *get_args(PartGoal)))
+            raise InputError(
+                f"the baseline has no plan for a {type(goal).__name__}; it plans for {known}"
+            )
     return plans
 
 

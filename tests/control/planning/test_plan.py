@@ -19,7 +19,7 @@ from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about
-from manipose_mj.tasks.goals import InsideGoal, PoseGoal, ShutGoal
+from manipose_mj.tasks.goals import Goal, InsideGoal, OnTableGoal, PoseGoal, ShutGoal
 from manipose_mj.tasks.goals.conditions import inside_cavity
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -172,6 +172,23 @@ def test_an_object_that_fits_no_way_is_refused():
         make_plan(STORE, _estimate(obj=_object((0.35, 0.08, 0.08))))
     drawer = replace(_drawer(), cavity=None)
     assert poses_in_cavity(_object(), drawer, 0.1) == ()
+
+
+class TiltedGoal(Goal):
+    """A goal of somebody's own."""
+
+    def met(self, state, tolerance):
+        return True
+
+    def progress(self, state, tolerance):
+        return 1.0
+
+
+def test_a_goal_of_a_kind_without_plans_is_refused():
+    with pytest.raises(InputError, match="no plan for a TiltedGoal; it plans for PoseGoal, "):
+        make_plan((TiltedGoal(),), _estimate())
+    kept = (PoseGoal("object", POSE), OnTableGoal("object"))
+    assert make_plan(kept, _estimate()) == make_plan(kept[:1], _estimate())
 
 
 @pytest.mark.parametrize("extents", [(0.25, 0.075, 0.075), (0.10, 0.06, 0.08), (0.05, 0.05, 0.05)])
