@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -12,8 +13,10 @@ from gymnasium.vector.utils import batch_space
 
 from manipose_mj.batch.worlds import State, Worlds
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import check_seed
 
 Infos = dict[str, Any]
+Seed = int | Sequence[int | None] | np.ndarray | jax.Array
 
 
 class BatchedEnv(VectorEnv):
@@ -32,6 +35,7 @@ class BatchedEnv(VectorEnv):
         self.worlds, self.num_envs = worlds, worlds.count
         self._state: State | None = None
         self._key = jax.random.key(0)
+        self._device = jax.devices()[0]
         low, high = worlds.lower, worlds.upper
         self.single_action_space = spaces.Box(low, high, low.shape, np.float32)
         first = worlds.at([worlds.pool.seeds[0]] * worlds.count).observation
@@ -42,26 +46,30 @@ class BatchedEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def reset(
-        self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, jax.Array], Infos]:
         """Begin an episode in every world.
 
         Args:
-          seed: A number chooses starts for all; a list, the episode of each world, of those in the pool.
+          seed: A number chooses starts for all; a list, tuple or array, the episode of each world, of those in the
+            pool; None, or a None for each world, goes on from the last.
           options: None are known.
 
         Raises:
-          InputError: An option is given, or a seed is not in the pool.
+          InputError: An option is given, or a seed is none or not in the pool.
         """
         if options:
             raise InputError(f"batched worlds have no reset options; got {sorted(options)}")
-        if isinstance(seed, list):
-            self._state = self.worlds.at(seed)
+        chosen = _chosen(seed)
+        if isinstance(chosen, list):
+            state = self.worlds.at(chosen)
         else:
-            if seed is not None:
-                self._key = jax.random.key(seed)
+            if chosen is not None:
+                self._key = jax.random.key(chosen)
             self._key, own = jax.random.split(self._key)
-            self._state = self.worlds.reset(own)
+            state = self.worlds.reset(own)
+        # Like every action: arrays that are bound to a device and others would each compile a step.
+        self._state = jax.device_put(state, self._device)
         return self._state.observation, {}
 
     def step(
@@ -70,19 +78,19 @@ class BatchedEnv(VectorEnv):
         """Go on by one control step.
 
         Args:
-          actions: `(worlds, n)`, of NumPy, JAX, or what speaks DLPack.
+          actions: `(worlds, n)`, of NumPy, JAX, or what speaks DLPack; lists of numbers too.
 
         Raises:
-          InputError: No episode was begun, or the actions have another shape.
+          InputError: No episode was begun, or the actions are no numbers or have another shape.
         """
         if self._state is None:
             raise InputError("no episode was begun: call reset first")
-        given = actions if isinstance(actions, np.ndarray) else jax.numpy.from_dlpack(actions)
+        given = _array(actions)
         if given.shape != self.action_space.shape:
             raise InputError(
                 f"actions have shape {given.shape}; expected {self.action_space.shape}"
             )
-        self._state = state = self.worlds.step(self._state, jax.numpy.asarray(given))
+        self._state = state = self.worlds.step(self._state, jax.device_put(given, self._device))
         infos = {
             "success": state.success,
             "success_once": state.success_once,
@@ -96,6 +104,32 @@ class BatchedEnv(VectorEnv):
     def close_extras(self, **kwargs: Any) -> None:
         """Close the worlds."""
         self.worlds.close()
+
+
+def _chosen(seed: Any) -> int | list[int] | None:
+    """A seed for all worlds, one for each, or none."""
+    given = seed.tolist() if isinstance(seed, np.ndarray | np.generic | jax.Array) else seed
+    if isinstance(given, list | tuple):
+        if given and all(each is None for each in given):
+            return None
+        for each in given:
+            check_seed(each)
+        return list(given)
+    if given is not None:
+        check_seed(given)
+    return given
+
+
+def _array(actions: Any) -> np.ndarray | jax.Array:
+    """Numbers, where they are."""
+    if isinstance(actions, jax.Array):
+        return actions
+    if hasattr(actions, "__dlpack__") and not isinstance(actions, np.ndarray):
+        return jax.numpy.from_dlpack(actions)
+    try:
+        return np.asarray(actions, np.float32)
+    except (TypeError, ValueError):
+        raise InputError(f"actions are no numbers in equal rows: {actions!r:.80}") from None
 
 
 def _space(values: jax.Array) -> spaces.Box:

@@ -47,6 +47,65 @@ def test_a_seed_chooses_the_starts(env):
     np.testing.assert_array_equal(env.reset(seed=3)[0]["panda/joint_positions"], first)
 
 
+@pytest.mark.parametrize("form", [tuple, np.array, jnp.array])
+def test_seeds_of_the_worlds_come_in_any_sequence(env, form):
+    wanted = env.reset(seed=[8, 7])[0]["panda/joint_positions"]
+    found = env.reset(seed=form([8, 7]))[0]["panda/joint_positions"]
+    np.testing.assert_array_equal(found, wanted)
+
+
+def test_no_seed_for_each_world_is_no_seed(env):
+    env.reset(seed=3)
+    wanted = env.reset()[0]["panda/joint_positions"]
+    env.reset(seed=3)
+    found = env.reset(seed=[None, None])[0]["panda/joint_positions"]
+    np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "a", 2**70, [7, None], [7.5, 8], True])
+def test_what_is_no_seed_is_refused(env, seed):
+    with pytest.raises(InputError, match="expected a whole number from 0"):
+        env.reset(seed=seed)
+
+
+class Tensor:
+    """Speaks DLPack, as PyTorch's do."""
+
+    def __init__(self, values):
+        self._values = values
+
+    def __dlpack__(self, **options):
+        return self._values.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self._values.__dlpack_device__()
+
+
+def test_all_kinds_of_actions_share_one_compiled_step(env):
+    own = BatchedEnv(batch.from_pool(env.worlds.pool, 2, "c"))
+    own.reset(seed=0)
+    action = wandering(1, 2)[0]
+    for given in (
+        jnp.asarray(action),
+        action,
+        Tensor(action),
+        action.tolist(),
+        action.astype(float),
+    ):
+        own.step(given)
+    own.reset(seed=[7, 8])
+    own.step(jnp.asarray(action))
+    assert own.worlds._step_jit._cache_size() == 1
+    own.close()
+
+
+@pytest.mark.parametrize("actions", ["left", None, [[0.0] * 8, [0.0] * 7], [["a"] * 8] * 2])
+def test_what_is_no_action_is_refused(env, actions):
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="actions "):
+        env.step(actions)
+
+
 def test_what_cannot_be_is_refused_in_one_line(env):
     env.reset(seed=0)
     with pytest.raises(InputError, match=r"shape \(3, 8\); expected \(2, 8\)"):
