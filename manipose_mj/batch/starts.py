@@ -161,10 +161,15 @@ class StartPool:
         """
         try:
             version, pool = pickle.loads(Path(path).read_bytes())
-        except (OSError, pickle.UnpicklingError, ValueError, TypeError, EOFError) as error:
-            raise InputError(f"{path}: no pool of starts can be read from it ({error})") from None
+        except Exception as error:  # damaged pickles raise anything
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise InputError(
+                f"{path}: no pool of starts can be read from it ({reason[:200]})"
+            ) from None
         if version != mujoco.__version__:
             raise InputError(
                 f"{path}: made with MuJoCo {version}; this is {mujoco.__version__}: draw it again"
             )
+        if not isinstance(pool, cls):
+            raise InputError(f"{path}: holds a {type(pool).__name__}, no pool of starts")
         return pool

@@ -8,7 +8,7 @@ from typing import Any, Unpack
 import gymnasium
 import numpy as np
 from dm_env import TimeStep
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.wrappers.utils import rescale_box
 
 from manipose_mj import suite
@@ -91,7 +91,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
             self.action_space, _, self._unscaled = rescale_box(self.action_space, low, high)
         self._terminate_on_success = terminate_on_success
         self._view = View(render_mode, camera, height, width)
-        self._running = False
+        self._running = self._closed = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -110,8 +110,10 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           The observation, and the info with the episode's `instruction`.
 
         Raises:
-          InputError: The seed is no 32-bit number, no object has that name, or the task takes no such goal.
+          ClosedEnvironmentError: It was closed.
+          InputError: The seed is no 32-bit number, the task takes no such goal, or has nothing of that name.
         """
+        self._require_open()
         spec = _episode(seed, options or {})
         super().reset(seed=seed)
         step = self.environment.reset(spec)
@@ -128,9 +130,11 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         """Go on by one control step.
 
         Raises:
+          ClosedEnvironmentError: The environment was closed.
           ResetNeeded: The episode is over, or none was started.
           InputError: The action has another shape, or holds a value that is no finite number.
         """
+        self._require_open()
         if not self._running:
             raise ResetNeeded("the episode is over, or none was started: call reset first")
         if self._unscaled is not None:
@@ -147,13 +151,23 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         return _copied(step), float(step.reward), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The picture, `(height, width, 3)` bytes, in mode `"rgb_array"`; None in the others."""
+        """The picture, `(height, width, 3)` bytes, in mode `"rgb_array"`; None in the others.
+
+        Raises:
+          ClosedEnvironmentError: The environment was closed.
+        """
+        self._require_open()
         return self._view.render(self.environment.physics)
 
     def close(self) -> None:
         """Free the simulation and the window; closing twice is no mistake."""
+        self._closed = True
         self._view.close()
         self.environment.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise ClosedEnvironmentError("the environment was closed: make another one")
 
     # Success as a function of a state, as in Gymnasium-Robotics' GoalEnv.
 

@@ -10,7 +10,7 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from manipose_mj import suite
@@ -234,6 +234,33 @@ def test_other_wrong_input_is_one_line(env, monkeypatch):
     with pytest.raises(InputError, match="a window needs a display") as caught:
         gymnasium.make(ID, render_mode="human")
     assert re.fullmatch("[^\n]+", str(caught.value))
+
+
+@pytest.mark.parametrize("option", ["furniture", "part"])
+def test_what_the_task_does_not_have_cannot_be_asked_for(env, option):
+    with pytest.raises(InputError, match=f"{option} is 'top'; this task has no furniture"):
+        env.reset(seed=0, options={option: "top"})
+    env.reset(seed=0)
+
+
+def test_no_object_can_be_asked_for_where_there_is_furniture_only():
+    opening = ManiPoseEnv(
+        "articulated/open_cabinet_door", objects=few("articulated/open_cabinet_door")
+    )
+    with pytest.raises(InputError, match="object is 'mug_000'; this task has no rigid object"):
+        opening.reset(seed=0, options={"object": "mug_000"})
+    opening.close()
+
+
+def test_a_closed_environment_says_so():
+    closed = ManiPoseEnv("single_object/target_pose", objects=OBJECTS, obs_mode="state")
+    closed.reset(seed=0)
+    closed.close()
+    closed.close()
+    action = closed.action_space.sample()
+    for use in (closed.reset, closed.render, lambda: closed.step(action)):
+        with pytest.raises(ClosedEnvironmentError, match="was closed: make another one"):
+            use()
 
 
 def test_a_reset_takes_an_object_a_goal_and_a_start(env):

@@ -14,6 +14,7 @@ from dm_env import specs
 from jaxtyping import Float
 
 from manipose_mj import actions
+from manipose_mj.errors import InputError
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.mjcf.sleep import sleep_disabled
@@ -188,15 +189,28 @@ class ManipulationTask(composer.Task):
         if self._randomiser is None:
             self._randomiser = self._make_randomiser(self._physics)
             self._preview = Preview(self._physics, self.scene)
+        spec = spec or EpisodeSpec()
+        self._check_asked(spec)
         changes = self._randomiser.draw(rng)
         changes = replace(changes, latency=changes.latency + self.env_config.latency)
         self._preview.change(changes)
-        spec = spec or EpisodeSpec()
         start = self.sample(rng, spec, self._preview)
         if spec.goal is not None:
             start = with_goal(start, np.array(spec.goal))
         # The seed is drawn whatever the sensors: the next episode shall not depend on what is observed.
         return replace(start, model=changes, noise_seed=int(rng.randint(2**31)))
+
+    def _check_asked(self, spec: EpisodeSpec) -> None:
+        """Raise `InputError` where an episode is asked to be about what this task does not have."""
+        scene = self.scene
+        for field, kind, there in (
+            ("object", "rigid object", scene.rigid_objects),
+            ("furniture", "furniture", scene.articulated_objects),
+            ("part", "furniture", scene.articulated_objects),
+        ):
+            name = getattr(spec, field)
+            if name is not None and not there:
+                raise InputError(f"{field} is {name!r}; this task has no {kind}: leave it out")
 
     def write(self, physics: mjcf.Physics, start: EpisodeStart) -> None:
         """Put a simulation where an episode starts, the robot at home, and let things come to rest."""

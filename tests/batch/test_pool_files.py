@@ -1,0 +1,36 @@
+"""Files of pools: what is none is refused in one line, whatever the pickle raises."""
+
+from __future__ import annotations
+
+import pickle
+
+import mujoco
+import pytest
+
+from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError
+
+DAMAGED = {
+    "of a module that is not there": b"cno_such_module\nPool\n.",
+    "of a name that is not there": b"cmanipose_mj.batch.starts\nNoPool\n.",
+    "with an index beyond its memory": b"h\x07.",
+    "empty": b"",
+    "text": b"no pickle",
+    "of three things": pickle.dumps((mujoco.__version__, None, None)),
+    "of something else": pickle.dumps((mujoco.__version__, [1, 2])),
+    "of another version": pickle.dumps(("2.0.0", None)),
+}
+
+
+@pytest.mark.parametrize("content", DAMAGED.values(), ids=DAMAGED)
+def test_a_file_that_holds_no_pool_is_named(content, tmp_path):
+    path = tmp_path / "pool.pickle"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refusal:
+        StartPool.load(path)
+    assert str(refusal.value).startswith(f"{path}: ") and "\n" not in str(refusal.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="no pool of starts can be read from it"):
+        StartPool.load(tmp_path / "none")
