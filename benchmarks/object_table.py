@@ -15,7 +15,6 @@ poses a failure names its stage: `perception` where the pose that was acted on w
 from __future__ import annotations
 
 import argparse
-import fnmatch
 import json
 import time
 from collections import Counter
@@ -35,11 +34,11 @@ from manipose_mj.assets.asset import Asset  # noqa: E402
 from manipose_mj.assets.asset_json import list_assets, read_asset  # noqa: E402
 from manipose_mj.assets.categories import CATALOGUE  # noqa: E402
 from manipose_mj.control.perception.pose_sources import POSE_SOURCES, sensors_for  # noqa: E402
-from manipose_mj.errors import InputError, unknown_name  # noqa: E402
+from manipose_mj.errors import InputError  # noqa: E402
 from manipose_mj.evaluation.episode import run_episode  # noqa: E402
 from manipose_mj.evaluation.statistics import wilson_interval  # noqa: E402
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec  # noqa: E402
-from manipose_mj.tasks.core.registry import all_tasks  # noqa: E402
+from manipose_mj.tasks.core.registry import tasks_named  # noqa: E402
 
 TASKS = ("single_object/target_pose", "articulated/store_middle_drawer")
 _SPLIT = "test"
@@ -103,22 +102,6 @@ def main() -> None:
         print(summary_of([row for row in rows if row.task == task]))
     if options.json is not None:
         options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
-
-
-def tasks_named(patterns: Sequence[str]) -> list[str]:
-    """The tasks of these names or patterns, in the order of the patterns.
-
-    Raises:
-      InputError: A pattern fits no task.
-    """
-    known = ["/".join(task) for task in all_tasks()]
-    found: dict[str, None] = {}
-    for pattern in patterns:
-        fitting = fnmatch.filter(known, pattern)
-        if not fitting:
-            raise unknown_name("task", pattern, known)
-        found.update(dict.fromkeys(fitting))
-    return list(found)
 
 
 def played(task: str, asset: Asset | None, seeds: Sequence[int], pose: str) -> list[Row]:

@@ -62,7 +62,7 @@ def evaluate(
     """Run a policy, and write results.jsonl, summary.json and report.html.
 
     Args:
-      tasks: Tasks to run, as `manipose list` names them.
+      tasks: Tasks to run, as `manipose list` names them, or patterns of names in quotes, such as "clutter/*".
       episodes: Episodes per task; by default 50, or all of a protocol.
       seed: Base seed; each episode derives its own from it.
       pose: Where the baseline takes its knowledge from: the simulator, or clouds; or clouds of objects only,
@@ -112,7 +112,10 @@ def evaluate(
     from manipose_mj.evaluation.planner_settings import PlannerSettings
     from manipose_mj.evaluation.policy_settings import PolicySettings
     from manipose_mj.evaluation.protocol.frozen import EPISODES
+    from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+    from manipose_mj.tasks.core.registry import tasks_named
 
+    tasks = tasks_named(tasks)
     if out is None:
         if resume:
             raise InputError("--resume needs --out: the folder whose evaluation goes on")

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from benchmarks.object_table import Row, line_of, summary_of, tasks_named
-from manipose_mj.errors import InputError
+from benchmarks.object_table import Row, line_of, summary_of
 
 TASK = "single_object/target_pose"
 
@@ -24,10 +21,3 @@ def test_refusals_and_objects_that_are_not_graspable_do_not_count():
     assert "NO" in line_of(rows[1]) and "no way" in line_of(rows[1])
     assert "(bus)" in line_of(rows[2]) and "refused" in line_of(rows[3])
     assert summary_of([]) == "-: 0 of 0"
-
-
-def test_tasks_are_named_by_patterns_each_once():
-    taken = tasks_named(["articulated/take_out_*", "articulated/take_out_oven", TASK])
-    assert len(taken) == 7 and taken[-1] == TASK
-    with pytest.raises(InputError, match="unknown task"):
-        tasks_named(["articulated/take_*_everything"])

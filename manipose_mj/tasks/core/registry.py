@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import fnmatch
 import importlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -125,6 +126,27 @@ def on_registration(listener: Callable[[TaskSpec], None]) -> None:
 def all_tasks() -> tuple[tuple[str, str], ...]:
     """Every registered `(domain, name)`, in the order of registration."""
     return tuple(_TASKS)
+
+
+def tasks_named(patterns: Iterable[str]) -> tuple[str, ...]:
+    """The full names of tasks, each once, in the order of the patterns.
+
+    Args:
+      patterns: Full names, or patterns of them with `*`, `?` and `[...]` as of `fnmatch`.
+
+    Raises:
+      InputError: There is no task of a name, or a pattern fits none.
+    """
+    known = ["/".join(task) for task in all_tasks()]
+    found: dict[str, None] = {}
+    for pattern in patterns:
+        fitting = fnmatch.filter(known, pattern)
+        if not fitting and set(pattern) & set("*?["):
+            raise InputError(f"no task fits {pattern!r}; `manipose list` names them")
+        if not fitting:
+            raise unknown_name("task", pattern, known)
+        found.update(dict.fromkeys(fitting))
+    return tuple(found)
 
 
 def named_task(full_name: str) -> TaskSpec:
