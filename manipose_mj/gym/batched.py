@@ -69,8 +69,8 @@ class BatchedEnv(VectorEnv):
             self._key, own = jax.random.split(self._key)
             state = self.worlds.reset(own)
         # Like every action: arrays that are bound to a device and others would each compile a step.
-        self._state = jax.device_put(state, self._device)
-        return self._state.observation, {}
+        self._state = state = jax.device_put(state, self._device)
+        return state.observation, {}
 
     def step(
         self, actions: Any

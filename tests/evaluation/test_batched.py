@@ -135,6 +135,21 @@ def test_a_refused_policy_is_named_and_leaves_no_results(policy, said, tmp_path)
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("engine", "changes", "said"),
+    [("c", {"hz": 7.0}, "a divisor of 50"), ("warp", {}, "engine 'warp' cannot run here")],
+)
+def test_an_evaluation_that_cannot_begin_leaves_no_results(
+    engine, changes, said, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("manipose_mj.batch.making.missing_for_warp", lambda: "no GPU")
+    kept = tmp_path / "notes.txt"
+    kept.write_text("mine")
+    with pytest.raises(InputError, match=said):
+        evaluate(config(tmp_path, "Puller", BatchSettings(engine, 2), **changes))
+    assert list(tmp_path.iterdir()) == [kept]
+
+
 def test_worlds_need_an_engine_and_a_policy(tmp_path, capsys):
     assert main(["evaluate", TASK, "--worlds", "4"]) == EXIT_INPUT
     assert "--worlds needs --engine" in capsys.readouterr().err
