@@ -19,7 +19,7 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.clouds import geom_instances
 from manipose_mj.mjcf.cameras.ray_camera import camera_id
 from manipose_mj.poses import SymmetryGroup
-from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, check_seed
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.simulation_state import read_simulation
 from manipose_mj.tasks.core.snapshot import MODEL_FIELDS
@@ -58,11 +58,14 @@ def draw_pool(
         of the model that any of them changes.
 
     Raises:
-      InputError: A mode cannot be batched, or the task cannot use the objects.
+      InputError: A mode cannot be batched, a seed is none, or the task cannot use the objects.
     """
     _require_batchable(config)
     if not episodes:
         raise InputError("no seeds: a batch of worlds needs at least one start")
+    for each in episodes:
+        if not isinstance(each, EpisodeSpec):
+            check_seed(each)
     specs = [e if isinstance(e, EpisodeSpec) else EpisodeSpec(seed=int(e)) for e in episodes]
     environment = suite.make(config, specs[0].seed)
     assert isinstance(environment, TaskEnvironment)

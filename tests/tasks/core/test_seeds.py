@@ -25,5 +25,6 @@ def test_seeds_of_numpy_are_seeds():
 def test_front_doors_refuse_negative_seeds():
     with pytest.raises(InputError, match="seed is -1; expected"):
         suite.load(*TASK, seed=-1)
-    with pytest.raises(InputError, match="seed is -1; expected"):
-        batch.make("/".join(TASK), worlds=1, seeds=(-1,), engine="c")
+    for seed in (-1, 1.5, "a"):
+        with pytest.raises(InputError, match=f"seed is {seed!r}; expected"):
+            batch.make("/".join(TASK), worlds=1, seeds=(seed,), engine="c")
