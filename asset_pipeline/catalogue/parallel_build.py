@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from asset_pipeline.build.data_set import require_writable, up_to_date
@@ -10,7 +10,7 @@ from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
 from asset_pipeline.catalogue import instance
 from manipose_mj.assets import categories as catalogue
 from manipose_mj.assets.categories import CATALOGUE
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, unknown_name
 
 
 def build_catalogue(
@@ -18,6 +18,7 @@ def build_catalogue(
     *,
     jobs: int = 1,
     only: Sequence[str] = (),
+    beyond: int = 0,
     progress: Callable[[BuildResult, int], None] | None = None,
 ) -> list[BuildResult]:
     """Build objects of the catalogue; those that are there, built by the same code, are left alone.
@@ -29,15 +30,23 @@ def build_catalogue(
       out: Folder of asset folders; None for the cache, where `catalogue.load` looks.
       jobs: Worker processes.
       only: Names of objects, or of categories for all of theirs; empty for the whole catalogue.
+      beyond: Builds so many objects of each category from the same generators instead that the catalogue does not have,
+        with the names after its last; 0: its own.
       progress: Called with each result and the number of objects in all.
 
     Returns:
       One result an object, sorted by name.
 
     Raises:
-      InputError: A name in `only` is unknown, or the folder cannot be written.
+      InputError: A name in `only` is unknown, the folder cannot be written, or objects beyond the catalogue have none:
+        its cache holds its own.
     """
-    chosen = _chosen(only)
+    if beyond < 0:
+        raise InputError(f"beyond is {beyond}; expected a number of objects, at least 0")
+    if beyond and out is None:
+        raise InputError("objects beyond the catalogue need a folder of their own: --out DIR")
+    entries = dict(_beyond(beyond) if beyond else catalogue.entries())
+    chosen = _chosen(entries, only)
     if out is not None:
         out = Path(out).absolute()
     require_writable(catalogue.cache_folder("mug").parent if out is None else out)
@@ -67,10 +76,17 @@ def build_instance(category: str, index: int, code: str, folder: Path, target: P
     return True
 
 
-def _chosen(only: Sequence[str]) -> dict[str, tuple[str, int]]:
-    entries = dict(catalogue.entries())
+def _beyond(count: int) -> Iterator[tuple[str, tuple[str, int]]]:
+    for row in CATALOGUE.values():
+        for index in range(row.instances, row.instances + count):
+            yield row.instance(index), (row.name, index)
+
+
+def _chosen(
+    entries: Mapping[str, tuple[str, int]], only: Sequence[str]
+) -> dict[str, tuple[str, int]]:
     if not only:
-        return entries
+        return dict(entries)
     chosen = {}
     for name in only:
         own = {n: e for n, e in entries.items() if name in (n, e[0])}

@@ -25,6 +25,7 @@ def build_assets(
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
     jobs: int = CORES,
     only: Annotated[tuple[str, ...], arg(metavar="NAME...")] = (),
+    beyond: Annotated[int, arg(help_behavior_hint="(catalogue only; default: 0)")] = 0,
     limit_s: float = 300.0,
     dask: Annotated[str | None, arg(metavar="ADDRESS")] = None,
     labels: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
@@ -49,6 +50,8 @@ def build_assets(
         tasks read.
       jobs: Objects at the same time, one core each.
       only: Objects to build, by name (of the catalogue, also categories); all without it.
+      beyond: So many objects of each category that the catalogue does not have, from the same generators: no split
+        and no protocol knows them.
       limit_s: Seconds after which the reading and building of a scan is stopped.
       dask: Build on the cluster of this dask scheduler, such as tcp://10.0.0.1:8786; its workers have
         to see PATH and DIR.
@@ -74,6 +77,8 @@ def build_assets(
             "--category, --up, --unit, --licence and --type are for meshes; "
             f"leave them out, {source} knows its objects"
         )
+    if beyond and source != CATALOGUE:
+        raise InputError(f"--beyond is for {CATALOGUE}; leave it out, {source} has what PATH holds")
     done: list[BuildResult] = []
     with cluster(dask), output.Progress("assets") as progress:
 
@@ -88,7 +93,7 @@ def build_assets(
                 raise InputError(
                     f"the catalogue's labels are exact by construction; leave out {labels}"
                 )
-            results = build_catalogue(out, jobs=jobs, only=only, progress=show)
+            results = build_catalogue(out, jobs=jobs, only=only, beyond=beyond, progress=show)
         else:
             if source not in SOURCES:
                 raise unknown_name("source", source, [CATALOGUE, *SOURCES])

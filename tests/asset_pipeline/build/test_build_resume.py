@@ -19,6 +19,7 @@ from asset_pipeline.build.pool import BuildJob, run_jobs
 from asset_pipeline.build.workers.limited_call import Limits
 from asset_pipeline.catalogue.parallel_build import build_catalogue
 from manipose_mj.assets import catalogue, categories
+from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.errors import InputError
 from manipose_mj.storage.staging import LOCK, clear_staging, put_in_place, staging
 from tests.places import ROOT
@@ -206,3 +207,17 @@ def test_catalogue_fills_the_cache_that_load_reads(tmp_path, monkeypatch):
     assert (result.folder / "asset.json").stat().st_mtime_ns == modified
     with pytest.raises(InputError, match="did you mean box"):
         build_catalogue(only=["boxx"])
+
+
+def test_catalogue_builds_objects_beyond_its_own(tmp_path):
+    (result,) = build_catalogue(tmp_path, only=["box"], beyond=1)
+    count = catalogue.CATALOGUE["box"].instances
+    assert (result.status, result.name) == ("built", f"box_{count:03d}")
+    assert result.name not in catalogue.instances("box")
+    assert read_asset(tmp_path / result.name).graspable is not None
+    with pytest.raises(InputError, match="box_000"):  # it is not beyond
+        build_catalogue(tmp_path, only=["box_000"], beyond=1)
+    for out, beyond, told in ((None, 1, "--out DIR"), (tmp_path, -1, "beyond is -1")):
+        with pytest.raises(InputError, match=told) as caught:
+            build_catalogue(out, beyond=beyond)
+        assert "\n" not in str(caught.value)

@@ -70,6 +70,9 @@ def test_freezing_again_keeps_starts_that_were_drawn_again(monkeypatch):
     monkeypatch.setattr(freeze, "builtin_tasks", lambda: specs)
     again = freeze.document("v1", V1)
     assert again["tasks"][task] == {**V1["tasks"][task], "episodes": entries[: redrawn + 1]}
+    # Which objects there are for further episodes takes building all of them.
+    asked = EpisodeSpec(object=entries[0]["object"])
+    monkeypatch.setattr(freeze.SceneSource, "strata", lambda scenes: [(asked,)])
     first = {"tasks": {task: {**V1["tasks"][task], "episodes": entries[:redrawn]}}}
     longer = freeze.document("v1", first)["tasks"][task]["episodes"]
     assert longer[:redrawn] == entries[:redrawn]
