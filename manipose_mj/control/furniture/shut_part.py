@@ -104,7 +104,8 @@ class ShutPart:
             if seen:
                 slender.append((float(label.extents[0] / label.extents[2]), turn))
         if slender:
-            self.handle[:3, :3] = max(slender, key=lambda each: each[0])[1]
+            turn = max(slender, key=lambda each: each[0])[1]
+            self.handle[:3, :3] = _this_side_up(turn, self.handle[:3, :3])
 
     @property
     def is_bar(self) -> bool:
@@ -121,7 +122,8 @@ class ShutPart:
         across, upright = bump.size
         self.handle[:3, 3] = bump.middle
         if max(across, upright) > _LONG * min(across, upright):
-            self.handle[:3, :3] = UP_FRONT if upright > across else ACROSS_FRONT
+            turn = UP_FRONT if upright > across else ACROSS_FRONT
+            self.handle[:3, :3] = _this_side_up(turn, self.handle[:3, :3])
         label, seen = handle_label(points, self.handle, bump.base)
         if seen:
             self.handle[:3, 3] = label.origin
@@ -336,6 +338,13 @@ def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     if abs(axis[nearest]) < _SNAP:
         return axis
     return np.eye(3)[nearest] * np.sign(axis[nearest])
+
+
+def _this_side_up(
+    turn: Float[np.ndarray, "3 3"], sensed: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "3 3"]:
+    """A bar's rotation, or the one half a turn about its Y further, which is nearer to the sensed: cup pulls open downwards."""
+    return max(turn, turn * [-1.0, 1.0, -1.0], key=lambda each: float((each * sensed).sum()))
 
 
 def _along_axes(

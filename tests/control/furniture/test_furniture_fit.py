@@ -202,6 +202,20 @@ def test_what_nobody_sensed_is_a_part_of_little_confidence_where_a_handle_stands
     np.testing.assert_allclose(place[1:], [-0.2, 0.302], atol=0.008)
 
 
+@pytest.mark.parametrize("turn", [ACROSS_FRONT, ACROSS_FRONT * [-1.0, 1.0, -1.0]])
+def test_a_cup_pull_that_was_sensed_elsewhere_keeps_its_side_up(turn):
+    """Z of its handle is up or down, as it was sensed."""
+    pull = rectangle(np.array([FRONT + 0.03, 0.03, 0.30]), 0.12 * Y, 0.014 * Z, X)
+    handle = compose(turn, np.array([FRONT + 0.03, 0.0, 0.2]))
+    part = sensed("slide", [0.0, 0.0, 0.0], handle=handle)
+    model = fit_furniture(cloud([*body(), pull]), SensedFurniture(X, (part,)), "cabinet")
+    label = model.parts[0].part.handle
+    assert label is not None
+    (place,) = transform(model.pose, label.origin[None])
+    np.testing.assert_allclose(place[1:], [0.09, 0.307], atol=0.01)
+    np.testing.assert_allclose(label.rotation, turn, atol=1e-6)
+
+
 def test_a_bar_that_was_sensed_askew_is_level_or_upright():
     bar = rectangle(np.array([FRONT + 0.03, -0.006, 0.2]), 0.012 * Y, 0.12 * Z, X)
     askew = compose(rotation_about(X, 0.7) @ UP_FRONT, np.array([FRONT + 0.03, 0.0, 0.26]))
