@@ -168,13 +168,13 @@ def listed(asset: Asset, *, played: bool) -> list[str]:
         lines.append(
             f"skipped {asset.name:<16}{len(controls)} knobs, buttons or trays: no task moves them"
         )
-    if not any(part.name.startswith(_OPENING) for part in asset.parts):
+    if not any(word in part.name for part in asset.parts for word in _OPENING):
         lines.append(f"skipped {asset.name:<16}-               no drawer, door or lid moves")
     return lines
 
 
 def _is_control(part: MovingPart) -> bool:
-    return part.handle is None and not part.name.startswith(_OPENING)
+    return part.handle is None and not any(word in part.name for word in _OPENING)
 
 
 def _moving(requested: Literal["open", "shut"]) -> DrawnTaskFactory:

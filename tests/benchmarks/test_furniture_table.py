@@ -26,3 +26,9 @@ def test_knobs_share_a_line_and_a_piece_without_doors_says_so():
     knobs = tuple(replace(door, name=f"knob_{i}", handle=None) for i in range(3))
     lines = listed(replace(catalogue.load("microwave", 0), parts=knobs), played=False)
     assert "3 knobs" in lines[0] and lines[1].endswith("no drawer, door or lid moves")
+
+
+def test_a_piece_whose_doors_have_names_of_their_own_is_not_said_to_have_none():
+    door = catalogue.load("microwave", 0).parts[0]
+    whole = replace(catalogue.load("microwave", 0), parts=(replace(door, name="left_door"),))
+    assert not listed(whole, played=False)
