@@ -79,7 +79,10 @@ class PileDraw:
         return tuple(found)
 
     def _drawn_of_own(self, rng: np.random.RandomState) -> tuple[Asset, ...]:
-        names = self._any.names
+        usable = {name for names in self._any.usable().values() for name in names}
+        names = [name for name in self._any.names if name in usable]
+        if not names:
+            self._any.draw(rng)  # says why
         chosen_names = sorted(rng.permutation(len(names))[:OBJECTS].tolist())
         return tuple(self._any.draw(rng, names[k]) for k in chosen_names)
 

@@ -10,8 +10,10 @@ from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import invert
+from manipose_mj.tasks.clutter.object_draw import Mixture, pile_of
 from manipose_mj.tasks.clutter.occluded import CAMERAS
 from manipose_mj.tasks.clutter.task import Clutter
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.goals import OnTableGoal, PoseGoal
 from manipose_mj.tasks.observations.visibility import visible_share
 from tests.few_objects import load
@@ -189,3 +191,16 @@ def test_too_few_or_ungraspable_objects_are_refused():
         suite.load("clutter", "pick", objects=[box, catalogue.load("box", 16)])
     with pytest.raises(InputError, match="articulated"):
         suite.load("clutter", "pick", objects=[catalogue.load("cabinet", 0)] * 5)
+
+
+def test_of_a_folder_only_what_a_pile_can_have_is_drawn():
+    boxes = [catalogue.load("box", index) for index in (0, 1, 2, 10, 16)]
+    others = [catalogue.load("cabinet", 0), catalogue.load("microwave", 0)]
+    draw = pile_of(Mixture(flat=0))(
+        EnvConfig("clutter/pick", split="test", objects=[*others, *boxes])
+    )
+    alone = pile_of(Mixture(flat=0))(EnvConfig("clutter/pick", split="test", objects=boxes))
+    for seed in range(3):
+        drawn = draw(np.random.RandomState(seed), EpisodeSpec()).assets
+        assert sorted(asset.name for asset in drawn) == [asset.name for asset in boxes]
+        assert drawn == alone(np.random.RandomState(seed), EpisodeSpec()).assets
