@@ -24,6 +24,10 @@ _CORNER = 0.6  # across: beyond it no flap has its handle
 # Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
 # of the handle, and a gap that ends it [m], wider than the shadow of a handle; points that tell.
 _FACE, _STRIP, _GAP, _TELLING = 0.04, 0.10, 0.15, 60
+# Where the front beside a hinge is looked at: how far from it, within the door, and along it from the handle; how far
+# behind it hinges are, of doors and of flaps, which are thicker, and from the side of the body [m].
+_BESIDE_HINGE, _ALONG_HINGE, _BEHIND, _FROM_SIDE = (0.02, 0.06), 0.25, (0.010, 0.022), 0.008
+_NEAR_SIDE = 0.04  # how far from there an upright hinge is that is taken to be there [m]
 # Strips of a front this wide [m] are the panel's where points fill that share of them at least.
 _CELL, _SHARE = 0.02, 0.25
 
@@ -120,6 +124,38 @@ def _filled(
     ]
 
 
+def hung(
+    origin: Float[np.ndarray, "3"],
+    axis: Float[np.ndarray, "3"],
+    handle: Float[np.ndarray, "4 4"],
+    facing: Float[np.ndarray, "n 3"],
+    bounds: Float[np.ndarray, "2 3"],
+) -> Float[np.ndarray, "3"]:
+    """Where a hinge is that is taken to be at `origin`: just behind the front there, and within the sides of the body.
+
+    Args:
+      origin: A point of the axis, object frame [m], of a door that is shut.
+      axis: Of the hinge, upright or level.
+      handle: `T_object_handle`.
+      facing: Points that face out of the front, object frame [m].
+      bounds: Low and high corner of the body, object frame [m].
+    """
+    across, along = (2, 1) if is_level(axis) else (1, 2)
+    found, own = origin.copy(), handle[:3, 3]
+    side = float(np.sign(origin[across] - own[across]))
+    end = side * float(bounds[1 if side > 0 else 0, across]) - _FROM_SIDE
+    if across == 1 and side * found[across] > end - _NEAR_SIDE:
+        found[across] = side * end
+    inside = side * (found[across] - facing[:, across])
+    beside = (inside > _BESIDE_HINGE[0]) & (inside < _BESIDE_HINGE[1])
+    beside &= np.abs(facing[:, along] - own[along]) < _ALONG_HINGE
+    beside &= np.abs(facing[:, 0] - origin[0]) < 2 * _FACE
+    if beside.sum() >= _TELLING:
+        behind = float(np.median(facing[beside, 0])) - _BEHIND[int(across == 2)]
+        found[0] = (origin[0] + behind) / 2
+    return found
+
+
 def likely_hinge(
     handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"], length: float = 0.0
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
@@ -143,7 +179,7 @@ def likely_hinge(
         away, middle, half = _away(handle, panel), panel.mean(axis=0), np.ptp(panel, axis=0) / 2
     across = 2 if level else 1
     side = -1.0 if away[across] > (-_UPRIGHT if level else 0.0) else 1.0
-    origin = np.array([panel[1, 0], middle[1], middle[2]])
+    origin = np.array([panel[1, 0] - _BEHIND[int(level)], middle[1], middle[2]])
     origin[across] = middle[across] + side * half[across]
     axis = np.zeros(3)
     axis[1 if level else 2] = -side if level else side

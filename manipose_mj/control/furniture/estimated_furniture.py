@@ -100,8 +100,7 @@ class EstimatedFurniture:
         Raises:
           StageFailure: No part is found that a goal could mean.
         """
-        self.model, self._held, self._moved = None, None, {}
-        self._before, self._sure = {}, {}
+        self.model, self._held, self._moved, self._before, self._sure = None, None, {}, {}, {}
         self._stops, self._swings = Stops(), Swings()
         for category, mask in self._task.furniture_masks:
             self._mask = mask
@@ -110,6 +109,7 @@ class EstimatedFurniture:
                 raise StageFailure("perception", f"no camera sees enough of the {category}")
             pose = self._views.camera_pose(self._physics, self._front_cameras[0])
             cloud, asked = self._cloud(), asked_parts(self._task)
+            whole = self._cloud(self._views.cameras + self._views.wide)
             found: list[tuple[SensedFurniture, FurnitureModel]] = []
             # Through all cameras as well where what stands open did not show.
             for each in (seen, cloud):
@@ -117,15 +117,15 @@ class EstimatedFurniture:
                     sensed = self._sense(each, pose, key)
                 except InputError as error:
                     raise StageFailure("perception", f"{category}: {error}") from None
-                model = fit_furniture(cloud, sensed, category)
+                model = fit_furniture(whole, sensed, category)
                 found.append((sensed, named(model, asked, self._expected_open)))
                 if not self._looks_shut(found[-1][1]):
                     break
             else:
                 found.reverse()
-            model = self._with_open_parts(*found[-1], cloud, asked)
+            model = self._with_open_parts(*found[-1], whole, asked)
             for part in model.parts if self._parts_alone else ():
-                model = model.with_part(with_extra(model, part, cloud))
+                model = model.with_part(with_extra(model, part, whole))
             self.model = model
 
     def _looks_shut(self, model: FurnitureModel) -> list[str]:

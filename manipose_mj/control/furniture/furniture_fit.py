@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,8 @@ _FACE, _FACE_LEAST = 0.012, 150
 _FREE_EDGE = 0.05  # of a door, from its handle [m]
 _TO_SIDE = 0.09  # a side of the body that is no further from the handle is the door's edge [m]
 _ONE_HINGE = 0.04  # hinges nearer than this are one [m]
+# How far handles of double doors are apart [m], and how nearly their body shows as wide to both sides.
+_TWO_DOORS, _AS_WIDE = (0.03, 0.25), 0.85
 _UNSEEN = 0.15  # of its confidence that is left to a handle of which no point shows
 _MEET = 0.01  # handles nearer than this are one [m]
 _LOOKS = 500
@@ -55,7 +57,7 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
     pose = object_pose(cloud, sensed)
     points = transform(invert(pose), cloud.points)
     normals = cloud.normals @ pose[:3, :3]
-    shut = [ShutPart(part, pose) for part in sensed.parts]
+    shut = [ShutPart(part, pose, category in WITH_KNOBS) for part in sensed.parts]
     bounds = _bounds(points, normals, shut)
     for part in shut:
         part.meet_handle(points, normals)
@@ -66,9 +68,11 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
         for part in tuple(shut):
             shut += part.column(shut, points, normals)
         shut += missed(shut, front, points)
+    sides = _as_wide_on_both_sides(bounds, shut)
     for part in shut:
         if category not in WITH_KNOBS or part.is_bar:
-            part.turn_as_doors_do(shut, bounds, points, normals)
+            part.turn_as_doors_do(shut, sides, points, normals)
+        part.hang(points, normals, sides)
     if any(part.opening == 0.0 for part in shut):
         for part in shut:
             part.meet_front(points, normals, float(bounds[1, 0]))
@@ -134,6 +138,23 @@ def _bounds(
             low, ends = ends_of(body)
             high[1:] = ends[1:]
     return np.stack([low, high])
+
+
+def _as_wide_on_both_sides(
+    bounds: Float[np.ndarray, "2 3"], shut: Sequence[ShutPart]
+) -> Float[np.ndarray, "2 3"]:
+    """Bounds of a body whose pictures end before it does on one side: double doors are in its middle."""
+    doors = [part for part in shut if part.measured and part.kind == "hinge"]
+    for first, second in combinations(doors, 2):
+        apart = second.handle[:3, 3] - first.handle[:3, 3]
+        if _TWO_DOORS[0] < abs(apart[1]) < _TWO_DOORS[1] and abs(apart[2]) < _MEET:
+            middle = float(first.handle[1, 3] + apart[1] / 2)
+            ends = np.abs(bounds[:, 1] - middle)
+            if ends.min() > _AS_WIDE * ends.max():
+                found = bounds.copy()
+                found[:, 1] = middle + np.array([-1.0, 1.0]) * ends.max()
+                return found
+    return bounds
 
 
 def _part(

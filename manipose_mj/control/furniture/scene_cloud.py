@@ -89,15 +89,21 @@ def _reached(
 class SceneViews:
     """Reads depth, segmentation and camera poses of a task's observations, and nothing else."""
 
-    def __init__(self, observables: Mapping[str, Observable], cameras: Sequence[str]) -> None:
+    def __init__(
+        self,
+        observables: Mapping[str, Observable],
+        cameras: Sequence[str],
+        wide: Sequence[str] = (),
+    ) -> None:
         """Looks at nothing yet.
 
         Args:
           observables: Of the task, enabled or not.
           cameras: Names of those to look through.
+          wide: Names of more, which show what is large whole and all else coarsely.
         """
         self._observables = observables
-        self.cameras = tuple(cameras)
+        self.cameras, self.wide = tuple(cameras), tuple(wide)
 
     def camera_pose(self, physics: mjcf.Physics, camera: str) -> Float[np.ndarray, "4 4"]:
         """`T_world_camera`, OpenCV's axes."""

@@ -9,30 +9,36 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.door_hinge import (
     can_be_a_door,
+    hung,
     is_level,
     likely_hinge,
     whole_front,
 )
 from manipose_mj.control.furniture.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
-from manipose_mj.control.furniture.shapes.furniture_model import PartModel
-from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
+from manipose_mj.control.furniture.shapes.furniture_model import motion_of
+from manipose_mj.control.furniture.shapes.handle_shape import (
+    ACROSS_FRONT,
+    UP_FRONT,
+    along_axes,
+    handle_label,
+    this_side_up,
+)
 from manipose_mj.control.furniture.shapes.relief import Bump, Relief
 from manipose_mj.control.furniture.shapes.standing_out import column_of, twin_of
 from manipose_mj.poses import compose, invert, transform
 
 FACING = 0.6  # cosine between normals of the front and X, at least
-_SNAP = np.cos(np.radians(8.0))  # joints along an axis of the body, or nearly so, are along it
+_SNAP = float(np.cos(np.radians(8.0)))  # joints nearly along an axis of the body are along it
 _TELLING = 150  # points of a panel that tell how far it swung, at least
 _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 # How far the panel beside a handle is looked at [m], and the estimated opening of a door may be off [rad].
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 # How far a hinge is off an edge of its panel that is taken to be at it: at least, and within it at most [m].
-_OFF_EDGE, _INSIDE, _INSIDE_FLAP = 0.04, 0.10, 0.20
+_OFF_EDGE, _OFF_FLAP, _INSIDE, _INSIDE_FLAP = 0.04, 0.015, 0.10, 0.20
 _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
@@ -42,6 +48,7 @@ _USUAL_HALF, _BESIDE = 0.05, 0.005
 _AT_HANDLE, _FAR, _MISSED = 0.03, 0.60, 0.12
 _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
+_ABOVE_BAR = 0.05  # how far above its bar the front of an appliance's door or drawer ends [m]
 _OUT = 0.9  # cosine between a handle's Y and the way out of the front, at least
 _LONG = 1.5  # times as long as wide: a bar
 # Of handles that look like a sensed one: how near another that was sensed would be it [m], their share of the confidence.
@@ -56,11 +63,14 @@ class ShutPart:
 
     Attributes: sensed; pose: `T_world_object`; kind; opening; axis; origin; handle: `T_object_handle`; half: of the
     handle's lengths along the object's axes, and a little more, as far as they show [m]; measured: whether they do; base: how far
-    out what the handle stands on is, along X, where it is no part of the panel's plane [m].
+    out what the handle stands on is, along X, where it is no part of the panel's plane [m]; bar_on_top: whether a bar is
+    near the upper edge of its front, as on appliances.
     """
 
-    def __init__(self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"]) -> None:
-        self.sensed, self.pose = sensed, pose
+    def __init__(
+        self, sensed: SensedPart, pose: Float[np.ndarray, "4 4"], bar_on_top: bool = False
+    ) -> None:
+        self.sensed, self.pose, self.bar_on_top = sensed, pose, bar_on_top
         self.kind: Literal["slide", "hinge"] = sensed.kind
         to_object = invert(pose)
         axis = to_object[:3, :3] @ sensed.axis
@@ -70,7 +80,7 @@ class ShutPart:
         joint = Joint(self.kind, self.origin, self.axis, (0.0, 1.0))
         back = motion_of(joint, -self.opening)
         self.handle = back @ to_object @ sensed.handle
-        self.handle[:3, :3] = _along_axes(self.handle[:3, :3])
+        self.handle[:3, :3] = along_axes(self.handle[:3, :3], _SNAP)
         self.back = back
         self.half = np.abs(self.handle[:3, 0]) * _USUAL_HALF + 2 * _BESIDE
         self.base: float | None = None
@@ -105,7 +115,7 @@ class ShutPart:
                 slender.append((float(label.extents[0] / label.extents[2]), turn))
         if slender:
             turn = max(slender, key=lambda each: each[0])[1]
-            self.handle[:3, :3] = _this_side_up(turn, self.handle[:3, :3])
+            self.handle[:3, :3] = this_side_up(turn, self.handle[:3, :3])
 
     @property
     def is_bar(self) -> bool:
@@ -123,7 +133,7 @@ class ShutPart:
         self.handle[:3, 3] = bump.middle
         if max(across, upright) > _LONG * min(across, upright):
             turn = UP_FRONT if upright > across else ACROSS_FRONT
-            self.handle[:3, :3] = _this_side_up(turn, self.handle[:3, :3])
+            self.handle[:3, :3] = this_side_up(turn, self.handle[:3, :3])
         label, seen = handle_label(points, self.handle, bump.base)
         if seen:
             self.handle[:3, 3] = label.origin
@@ -224,8 +234,19 @@ class ShutPart:
         beyond = side * (self.origin[across] - edge)
         # Beside an upright hinge there may be another door, whose handle was not found.
         inside = _INSIDE_FLAP if across == 2 else _INSIDE
-        if abs(beyond) > _OFF_EDGE and beyond > -inside:
+        if abs(beyond) > (_OFF_FLAP if across == 2 else _OFF_EDGE) and beyond > -inside:
             self.origin[across] = edge
+
+    def hang(
+        self,
+        points: Float[np.ndarray, "n 3"],
+        normals: Float[np.ndarray, "n 3"],
+        bounds: Float[np.ndarray, "2 3"],
+    ) -> None:
+        """Have the hinge of a shut door where doors have theirs: just behind their front, within the body's sides."""
+        if self.kind == "hinge" and self.opening == 0.0 and np.abs(self.axis[1:]).max() >= _SNAP:
+            facing = points[normals[:, 0] > FACING]
+            self.origin = hung(self.origin, self.axis, self.handle, facing, bounds)
 
     def _is_in_a_row_with(self, other: ShutPart) -> bool:
         """Whether a sure drawer has a handle of the same size at the same height, and both show."""
@@ -271,7 +292,7 @@ class ShutPart:
         self.back = motion_of(Joint("hinge", self.origin, self.axis, (0.0, 1.0)), -self.opening)
         self.handle = self.back @ stands
         # The handle was taken to be as far open as the panel.
-        self.handle[:3, :3] = _along_axes(self.handle[:3, :3], np.cos(_MISSWUNG))
+        self.handle[:3, :3] = along_axes(self.handle[:3, :3], float(np.cos(_MISSWUNG)))
 
 
 def claim(shut: Sequence[ShutPart], relief: Relief, points: Float[np.ndarray, "n 3"]) -> None:
@@ -326,35 +347,11 @@ def _missed_part(
     return part
 
 
-def motion_of(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
-    """How a part moves that opens so far [m or rad], object frame."""
-    empty = np.zeros((0, 2, 3))
-    moving = MovingPart("", joint, None, None)
-    return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)
-
-
 def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     nearest = int(np.abs(axis).argmax())
     if abs(axis[nearest]) < _SNAP:
         return axis
     return np.eye(3)[nearest] * np.sign(axis[nearest])
-
-
-def _this_side_up(
-    turn: Float[np.ndarray, "3 3"], sensed: Float[np.ndarray, "3 3"]
-) -> Float[np.ndarray, "3 3"]:
-    """A bar's rotation, or the one half a turn about its Y further, which is nearer to the sensed: cup pulls open downwards."""
-    return max(turn, turn * [-1.0, 1.0, -1.0], key=lambda each: float((each * sensed).sum()))
-
-
-def _along_axes(
-    rotation: Float[np.ndarray, "3 3"], least: float = _SNAP
-) -> Float[np.ndarray, "3 3"]:
-    """Along the axes of the body, where that is nearly so: by this cosine or more."""
-    nearest = np.round(rotation)
-    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > least:
-        return nearest
-    return rotation
 
 
 def panel_place(
@@ -381,13 +378,17 @@ def between_neighbours(
     low, high = bounds[0].copy(), bounds[1].copy()
     own, half = part.handle[:3, 3], part.half
     for other in others:
-        if other is part or other.sensed.confidence < 0.15 or not other.shows:
+        bar = other.bar_on_top and other.is_bar and part.is_bar
+        bar = bar and float(np.abs(other.half - part.half).max()) < _ALIKE
+        if other is part or not other.shows or (other.sensed.confidence < 0.15 and not bar):
             continue
         away = other.handle[:3, 3] - own
         axis = 2 if abs(away[2]) > abs(away[1]) else 1
         if abs(away[axis]) < 0.05:
             continue
         middle = own[axis] + away[axis] / 2
+        if axis == 2 and bar:
+            middle = min(own[2], other.handle[2, 3]) + _ABOVE_BAR
         if away[axis] > 0:
             high[axis] = min(high[axis], max(middle, own[axis] + half[axis]))
         else:

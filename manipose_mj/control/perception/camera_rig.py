@@ -15,10 +15,12 @@ FRONT_VIEWS = (
     CameraView("right_shoulder", (-0.05, -0.6, 0.75), _LOOKED_AT),
 )
 FRONT_CAMERAS = tuple(view.name for view in FRONT_VIEWS)
+# Above the first of them: fronts and bars of furniture end beyond what the others see.
+WIDE_VIEW = CameraView("above_wide", (-0.35, 0.0, 1.30), _LOOKED_AT, 75.0)
 HAND_CAMERA = "panda/wrist"  # looks where the hand is brought to look, nowhere else
 # A depth camera's noise, at a third of its usual pixels.
 SENSORS = SensorConfig(
-    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS, HAND_CAMERA),
+    cameras=(*CAMERAS, *SPARE_CAMERAS, *FRONT_VIEWS, HAND_CAMERA, WIDE_VIEW),
     height=240,
     width=320,
     depth_model="structured_light",
@@ -27,6 +29,11 @@ SENSORS = SensorConfig(
 
 
 def standing_cameras(sensors: SensorConfig) -> tuple[str, ...]:
-    """The names of those that do not move, in their order; where there are none, of all."""
+    """The names of those that do not move, but for the wide one, in their order; where there are none, of all."""
     names = sensors.camera_names
-    return tuple(name for name in names if name != HAND_CAMERA) or names
+    return tuple(name for name in names if name not in (HAND_CAMERA, WIDE_VIEW.name)) or names
+
+
+def wide_cameras(sensors: SensorConfig) -> tuple[str, ...]:
+    """The name of the wide one, where there is one: it shows furniture whole, and all else coarsely."""
+    return tuple(name for name in sensors.camera_names if name == WIDE_VIEW.name)

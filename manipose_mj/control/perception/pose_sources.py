@@ -6,7 +6,12 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.assets.asset import Asset
-from manipose_mj.control.perception.camera_rig import FRONT_CAMERAS, SENSORS, standing_cameras
+from manipose_mj.control.perception.camera_rig import (
+    FRONT_CAMERAS,
+    SENSORS,
+    standing_cameras,
+    wide_cameras,
+)
 from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.foreign_estimator import ForeignEstimator
 from manipose_mj.control.perception.oracle import OraclePerception
@@ -81,7 +86,8 @@ def _perception(
     if pose == "estimated":
         cameras = standing_cameras(task.env_config.sensors)
         front = tuple(name for name in FRONT_CAMERAS if name in cameras) or cameras
-        world = SensedWorld(task, physics, cameras, front)
+        wide = wide_cameras(task.env_config.sensors)
+        world = SensedWorld(task, physics, cameras, front, wide)
     else:
         world = SimulatedWorld(task, physics)
     if estimator is None:

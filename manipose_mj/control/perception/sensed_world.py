@@ -43,6 +43,7 @@ class SensedWorld:
         physics: mjcf.Physics,
         cameras: tuple[str, ...],
         front_cameras: tuple[str, ...],
+        wide_cameras: tuple[str, ...] = (),
         sense: PartSensor = sense_parts,
     ) -> None:
         """Looks at nothing yet.
@@ -52,10 +53,11 @@ class SensedWorld:
           physics: The environment's.
           cameras: All that are looked through.
           front_cameras: Those that look at what the robot faces, the highest first.
+          wide_cameras: Further ones, which show furniture whole.
           sense: Finds handles and joints.
         """
         self._task, self._physics = task, physics
-        self._views = SceneViews(task.task_observables, cameras)
+        self._views = SceneViews(task.task_observables, cameras, wide_cameras)
         self._furniture = EstimatedFurniture(task, physics, self._views, front_cameras, sense)
         self._followed: FurnitureModel | None = None  # as objects in drawers were taken along last
         self._robot = _robot_alone()

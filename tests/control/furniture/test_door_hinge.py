@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.door_hinge import can_be_a_door, likely_hinge, whole_front
+from manipose_mj.control.furniture.door_hinge import (
+    can_be_a_door,
+    hung,
+    likely_hinge,
+    whole_front,
+)
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
 from manipose_mj.poses import compose
 
@@ -111,3 +116,21 @@ def test_what_is_too_wide_for_one_door_is_two(y, hinge):
     assert can_be_a_door(origin, axis, handle(y, 0.4), wide)
     far = np.array([0.2, -hinge or 0.5, 0.3])
     assert not can_be_a_door(far, axis, handle(-0.45, 0.4), wide)
+
+
+@pytest.mark.parametrize(
+    ("axis", "place", "behind"),
+    [(Z, (0.15, 0.08, 0.4), 0.010), (-Y, (0.15, -0.1, 0.6), 0.022)],
+)
+def test_a_hinge_hangs_half_way_to_where_doors_have_theirs_behind_the_front(axis, place, behind):
+    face = np.stack(np.meshgrid([0.2], np.arange(-0.3, 0.1, 0.01), np.arange(0.1, 0.6, 0.01)), -1)
+    origin = hung(np.array(place), axis, handle(-0.1, 0.3), face.reshape(-1, 3), PANEL)
+    assert origin[0] == pytest.approx((place[0] + 0.2 - behind) / 2)
+    unseen = hung(np.array(place), axis, handle(-0.1, 0.3), np.zeros((0, 3)), PANEL)
+    assert unseen[0] == place[0]
+
+
+@pytest.mark.parametrize(("thought", "hangs"), [(0.08, 0.092), (0.13, 0.092), (0.02, 0.02)])
+def test_an_upright_hinge_near_the_side_of_the_body_is_just_within_it(thought, hangs):
+    place = np.array([0.2, thought, 0.4])
+    assert hung(place, Z, handle(-0.2, 0.4), np.zeros((0, 3)), PANEL)[1] == pytest.approx(hangs)

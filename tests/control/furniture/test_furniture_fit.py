@@ -311,6 +311,48 @@ def test_an_ovens_long_bar_is_no_knob():
     assert found.part.joint.origin[2] == pytest.approx(-HEIGHT / 2, abs=0.03)
 
 
+def test_the_door_of_an_oven_ends_above_the_bar_of_the_drawer_below():
+    bars = [
+        rectangle(np.array([FRONT + 0.03, -0.2, z]), 0.4 * Y, 0.012 * Z, X) for z in (0.42, 0.1)
+    ]
+    door = sensed("hinge", [FRONT + 0.03, 0.0, 0.426], handle=level(0.426))
+    below = sensed("slide", [0.0, 0.0, 0.0], handle=level(0.106), confidence=0.08)
+    found = surest(cloud([*body(), *bars]), (door, below), "oven")
+    np.testing.assert_allclose(found.part.joint.axis, Y, atol=1e-6)
+    assert found.part.joint.origin[2] == pytest.approx(0.106 + 0.05 - HEIGHT / 2, abs=0.01)
+
+
+def test_double_doors_are_as_wide_though_pictures_end_before_one_does():
+    knobs = [knob(-0.05), knob(0.05)]
+    parts = tuple(
+        sensed("hinge", [FRONT + 0.03, y, 0.3], origin=np.array([FRONT, 0.0, 0.3]), axis=X)
+        for y in (-0.05, 0.05)
+    )
+    seen = [(p[p[:, 1] < 0.27], n[p[:, 1] < 0.27]) for p, n in body()]
+    model = fit_furniture(
+        cloud([*(each for each in seen if len(each[0])), *knobs]),
+        SensedFurniture(X, parts),
+        "cabinet",
+    )
+    places = sorted(
+        float(transform(model.pose, part.part.joint.origin[None])[0, 1]) for part in model.parts
+    )
+    np.testing.assert_allclose(places, [-HALF, HALF], atol=0.02)
+
+
+def test_the_far_end_of_a_bar_counts_though_few_points_show_it():
+    at = compose(ACROSS_FRONT, np.array([FRONT + 0.03, 0.0, 0.25]))
+    near = rectangle(np.array([FRONT + 0.03, -0.3, 0.244]), 0.4 * Y, 0.012 * Z, X)[0]
+    far = rectangle(np.array([FRONT + 0.03, 0.1, 0.244]), 0.35 * Y, 0.012 * Z, X)[0]
+    dense = np.repeat(near, 20, axis=0) + np.random.default_rng(1).normal(
+        0, 1e-3, (20 * len(near), 3)
+    )
+    label, seen = handle_label(np.concatenate([dense, far]), at, FRONT)
+    assert seen
+    assert label.extents[0] == pytest.approx(0.75, abs=0.02)
+    assert label.origin[1] == pytest.approx(0.075, abs=0.01)
+
+
 @pytest.mark.parametrize(("thought", "is_at"), [(0.45, HALF), (0.22, HALF), (0.31, 0.31)])
 def test_a_hinge_is_at_the_edge_of_its_front_but_for_small_errors(thought, is_at):
     origin = np.array([FRONT, thought, 0.2])

@@ -13,7 +13,13 @@ from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.grasping.pick import pick_object
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.perception.camera_rig import SENSORS
+from manipose_mj.control.perception.camera_rig import (
+    FRONT_CAMERAS,
+    SENSORS,
+    WIDE_VIEW,
+    standing_cameras,
+    wide_cameras,
+)
 from manipose_mj.control.perception.estimated import EstimatedPerception
 from manipose_mj.control.perception.objects.goal_depth import as_unsure_as_deep
 from manipose_mj.control.perception.objects.known_shapes import known_shapes
@@ -320,6 +326,14 @@ def test_known_shapes_are_in_their_label_frames(category):
 
 def test_sensors_are_noisy():
     assert SENSORS.depth_sensor is not None
+
+
+def test_only_furniture_is_looked_at_through_the_wide_camera():
+    assert wide_cameras(SENSORS) == (WIDE_VIEW.name,)
+    assert set(FRONT_CAMERAS) < set(standing_cameras(SENSORS))
+    assert WIDE_VIEW.name not in standing_cameras(SENSORS)
+    front = replace(SENSORS, cameras=("front",))
+    assert wide_cameras(front) == () and standing_cameras(front) == ("front",)
 
 
 @pytest.mark.parametrize("pose", ["oracle", "estimated"])

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
+from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.shapes.boxes import Boxes, no_boxes, without
 from manipose_mj.poses import compose, rotation_about
 
@@ -191,3 +192,10 @@ def _tray(cavity: Cavity, panel: Float[np.ndarray, "2 3"]) -> Boxes:
     right = [[low[0], high[1], low[2]], [end, high[1] + _TRAY_SIDE, top]]
     back = [[low[0] - _TRAY_SIDE, low[1], low[2]], [low[0], high[1], top]]
     return np.array([floor, left, right, back])
+
+
+def motion_of(joint: Joint, opening: float) -> Float[np.ndarray, "4 4"]:
+    """How a part moves that opens so far [m or rad], object frame."""
+    empty = np.zeros((0, 2, 3))
+    moving = MovingPart("", joint, None, None)
+    return PartModel(moving, np.zeros((2, 3)), empty, 0.0, 0.0, np.zeros((0, 3))).motion(opening)

@@ -24,6 +24,8 @@ _STRAY = 0.15  # of the points of a usual strip, up to which others are stray
 _RARE = 0.08  # share of a bar's points that counts as noise, on either side
 # Where points are beside a bar, from its axis [m]; from which share of the bar's own density on it is none.
 _BESIDE, _AS_DENSE = (0.030, 0.055), 0.5
+_LONG = 0.2  # of a bar, from which on stray points join it to no other [m]
+_HALF_BAR = 0.6  # how far along a handle its points are looked for, either way [m]
 _STANDING = 0.012  # how far points of a handle are before its panel [m]
 
 
@@ -54,12 +56,15 @@ def _measured(
     local = transform(invert(handle), points)
     panel = (front - handle[0, 3]) * float(handle[0, 1])  # along the handle's Y [m]
     standing = local[:, 1] > min(panel + _STANDING, -0.006)
-    near = standing & (local[:, 1] < 0.03) & (np.abs(local[:, 0]) < 0.35)
+    near = standing & (local[:, 1] < 0.03) & (np.abs(local[:, 0]) < _HALF_BAR)
     on = near & (np.abs(local[:, 2]) < 2 * _HANDLE_REACH)
     if on.sum() < 12 or _goes_on(local[near], local[on]):
         usual = np.array([0.10, 0.012, 0.012])
         return PoseLabel(handle[:3, 3], handle[:3, :3], "handle", usual, _TURNS), False
     along = run_around(_often(local[on, 0]), 0.025)
+    if along[1] - along[0] > _LONG:
+        # One camera sees its far end, with few points, and several its near one, with many.
+        along = run_around(local[on, 0], 0.025)
     on &= (local[:, 0] >= along[0]) & (local[:, 0] <= along[1])
     length = max(along[1] - along[0], 0.012)
     sides = _sides(local[on, 2])
@@ -153,3 +158,18 @@ def handle_boxes(handle: PoseLabel, front: float) -> Boxes:
         boxes[0][:, 1:] = handle.origin[1:] + np.array([[-across], [across]])
         boxes[0][0, 0] = min(boxes[0][0, 0], front)
     return np.stack(boxes)
+
+
+def this_side_up(
+    turn: Float[np.ndarray, "3 3"], sensed: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "3 3"]:
+    """A bar's rotation, or the one half a turn about its Y further, which is nearer to the sensed: cup pulls open downwards."""
+    return max(turn, turn * [-1.0, 1.0, -1.0], key=lambda each: float((each * sensed).sum()))
+
+
+def along_axes(rotation: Float[np.ndarray, "3 3"], least: float) -> Float[np.ndarray, "3 3"]:
+    """A handle's rotation along the axes of the body, where that is nearly so: by this cosine or more."""
+    nearest = np.round(rotation)
+    if abs(np.linalg.det(nearest) - 1) < 1e-6 and (rotation * nearest).sum(axis=0).min() > least:
+        return nearest
+    return rotation
