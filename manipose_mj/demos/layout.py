@@ -123,6 +123,11 @@ def trajectory_name(obs_mode: str, control_mode: str) -> str:
     return f"trajectory.{obs_mode.replace('/', '-') or 'none'}.{control_mode}.{BACKEND}"
 
 
+def recorded_name() -> str:
+    """Name of the HDF5 file of a recording, which no replay has."""
+    return f"{trajectory_name('none', RECORDED_MODE)}.h5"
+
+
 def task_folder(out: Path, task: str) -> Path:
     """Where the demonstrations of a task are, in the folder of several."""
     return out / task.replace("/", "__")
@@ -196,6 +201,8 @@ def write_description(demos: DemoSet) -> None:
 def find_sets(path: Path) -> list[DemoSet]:
     """The sets in a folder, or in the folders in it, or of one HDF5 file.
 
+    Where a folder holds a recording, its replays in the same folder are left out.
+
     Raises:
       InputError: There is none, or a file is broken.
     """
@@ -204,7 +211,12 @@ def find_sets(path: Path) -> list[DemoSet]:
     files = sorted([*path.glob("trajectory.*.h5"), *path.glob("*/trajectory.*.h5")])
     if not files:
         raise InputError(f"{path}: holds no demonstrations (trajectory.*.h5)")
-    return [read_set(file) for file in files]
+    recorded = {file.parent for file in files if file.name == recorded_name()}
+    return [
+        read_set(file)
+        for file in files
+        if file.parent not in recorded or file.name == recorded_name()
+    ]
 
 
 def read_set(path: Path) -> DemoSet:

@@ -17,8 +17,8 @@ from manipose_mj.demos.layout import (
     current_versions,
     frozen_seeds,
     read_set,
+    recorded_name,
     task_folder,
-    trajectory_name,
     write_description,
     writing,
 )
@@ -70,7 +70,7 @@ class RecordConfig:
     @property
     def path(self) -> Path:
         """Of the HDF5 file."""
-        return self.folder / f"{trajectory_name('none', RECORDED_MODE)}.h5"
+        return self.folder / recorded_name()
 
     @property
     def parts(self) -> Path:

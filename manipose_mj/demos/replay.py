@@ -73,6 +73,10 @@ class ReplayConfig:
         changes = self.obs_mode or self.control_mode != RECORDED_MODE
         if changes and self.out is None:
             raise InputError("observations or another control mode need --out for the new files")
+        if self.control_mode == "primitive":
+            raise InputError(
+                "control mode primitive: joint targets cannot be made into whole motions"
+            )
         if self.out is not None and not changes:
             raise InputError("--out needs --obs-mode or --control-mode: else nothing is new")
 

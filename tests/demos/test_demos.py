@@ -280,6 +280,7 @@ def _without(path: Path, name: str, kept: int = 0) -> None:
         ("replay {demos} --out {tmp}/out", "nothing is new"),
         ("replay {demos} --obs-mode poses --out {tmp}/out", "did you mean pose"),
         ("replay {demos} --control-mode pd_ee --out {tmp}/out", "control mode 'pd_ee'"),
+        ("replay {demos} --control-mode primitive --out {tmp}/out", "into whole motions"),
         ("export {demos} --out {tmp}/out --hz 0", "hz is 0"),
         ("export {demos} --out {tmp}/out --obs-mode pose", "expected state+pose"),
         ("export {demos} --out {tmp}", "is there already"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import h5py
@@ -27,6 +28,16 @@ def test_replays_are_bit_identical(demos):
     assert differing_versions(demos) == []
     older = replace(demos, versions={**demos.versions, "numpy": "1.0"})
     assert differing_versions(older)[0].startswith("numpy 1.0 -> ")
+
+
+def test_a_folder_of_a_recording_and_its_replays_is_the_recording(copied):
+    """As `manipose demos replay DIR --control-mode MODE --out DIR` leaves it."""
+    name = "trajectory.none.pd_ee_pose.mujoco_cpu"
+    for kind in (".h5", ".json"):
+        shutil.copy(copied.with_suffix(kind), copied.with_name(name + kind))
+    assert [each.path for each in find_sets(copied.parent)] == [copied]
+    copied.unlink()
+    assert [each.path.stem for each in find_sets(copied.parent)] == [name]
 
 
 @pytest.mark.full
