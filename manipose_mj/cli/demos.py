@@ -36,7 +36,7 @@ def record_demos(
     """Record demonstrations of the baseline with true poses, on training objects, at 50 Hz.
 
     Args:
-      tasks: Tasks to record, as `manipose list` names them.
+      tasks: Tasks to record, as `manipose list` names them, or patterns such as "single_object/*".
       out: Folder; every task gets one in it.
       episodes: Successes per task.
       seed: Base seed; each attempt derives its own from it, as episodes of manipose evaluate do.
@@ -52,9 +52,12 @@ def record_demos(
     from manipose_mj.cli.evaluate import check_names
     from manipose_mj.console import output
     from manipose_mj.demos.record import RecordConfig, record
+    from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+    from manipose_mj.tasks.core.registry import tasks_named
 
     if not tasks:
         raise InputError("no task given; `manipose list` names them")
+    tasks = tasks_named(tasks)
     named = check_names(tasks, objects)
     for name in named:
         category, index = find(name)

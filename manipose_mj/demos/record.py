@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,15 @@ class RecordConfig:
         return self.folder / PARTS
 
     @property
+    def stated_objects(self) -> list[str] | None:
+        """As the files name them: folders by their whole path, so that a replay finds them from anywhere."""
+        from manipose_mj.tasks.core.object_selection import is_folder
+
+        if self.objects is None:
+            return None
+        return [str(Path(each).absolute()) if is_folder(each) else each for each in self.objects]
+
+    @property
     def identity(self) -> dict[str, Any]:
         """What two runs must share for their attempts to belong together."""
         return {
@@ -85,7 +95,7 @@ class RecordConfig:
             "episodes": self.episodes,
             "seed": self.seed,
             "failures": self.failures,
-            "objects": None if self.objects is None else list(self.objects),
+            "objects": self.stated_objects,
             "versions": current_versions(),
             "protocol": current_protocol(),
         }
@@ -160,6 +170,12 @@ def _finished(config: RecordConfig, resume: bool) -> DemoSet:
             f"{config.path}: holds {wins} successes; choose another --out, and another --seed to "
             "record others"
         )
+    if demos.env_kwargs["objects"] != config.stated_objects:
+        raise InputError(f"{config.path}: its objects are others; choose another --out")
+    attempts = islice(config.seeds(), (_PATIENCE + 1) * (wins + 2))
+    planned = (seed for _, seed in attempts)
+    if not all(each.episode_seed in planned for each in demos.episodes):
+        raise InputError(f"{config.path}: was recorded with another --seed; choose another --out")
     shutil.rmtree(config.parts, ignore_errors=True)
     return demos
 
@@ -241,7 +257,7 @@ def _assembled(config: RecordConfig, ended: list[DemoEpisode]) -> DemoSet:
     env_kwargs = {
         "obs_mode": "state",
         "control_mode": RECORDED_MODE,
-        "objects": None if config.objects is None else list(config.objects),
+        "objects": config.stated_objects,
         "split": "train",
     }
     episodes = tuple(replace(each, episode_id=i) for i, each in enumerate(wanted))

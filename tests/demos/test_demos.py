@@ -195,6 +195,30 @@ def test_the_first_successes_are_kept_whatever_was_interrupted(tmp_path, monkeyp
     assert record(config(tmp_path / "cut", episodes=5), resume=True).episodes == whole.episodes
     with pytest.raises(InputError, match="holds 5 successes"):
         record(config(tmp_path / "cut", episodes=6), resume=True)
+    with pytest.raises(InputError, match="recorded with another --seed"):
+        record(config(tmp_path / "cut", episodes=5, seed=2), resume=True)
+    with pytest.raises(InputError, match="its objects are others"):
+        record(config(tmp_path / "cut", episodes=5, objects=("mug_000",)), resume=True)
+
+
+def test_recordings_name_folders_of_objects_by_their_whole_path(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my assets").mkdir()
+    recorded = record(config(Path("out"), episodes=1, objects=("my assets", "mug_000")))
+    assert recorded.env_kwargs["objects"] == [str(tmp_path / "my assets"), "mug_000"]
+
+
+def test_record_takes_patterns(tmp_path, monkeypatch):
+    asked = []
+
+    def ended(config, **options):
+        asked.append(config.task)
+        raise InputError("enough")
+
+    monkeypatch.setattr(recording, "record", ended)
+    words = ["demos", "record", "*/target_pos?", "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main(words) == 2 and asked == [TASK]
 
 
 def test_failures_are_kept_with_their_stage_where_asked_for(tmp_path, monkeypatch):
