@@ -57,15 +57,24 @@ def train_ppo(
     """
     one_thread_per_process()
     compile_at_once_on_gpus()
-    for name, value in (("worlds", worlds), ("starts", starts), ("episode", episode)):
-        if value <= 0:
+    numbers = {"worlds": worlds, "starts": starts, "minutes": minutes, "updates": updates}
+    for name, value in numbers.items():
+        if value is not None and not value > 0:
             raise InputError(f"--{name} is {value}; expected more than 0")
-    if minutes <= 0 or (updates is not None and updates < 1):
-        raise InputError("--minutes and --updates: expected more than 0")
+    if not 0 < episode < float("inf"):
+        raise InputError(f"--episode is {episode}; expected a finite time, more than 0")
+    if until is not None and not 0 < until <= 1:
+        raise InputError(f"--until is {until}; expected a share, more than 0 and at most 1")
     from manipose_mj.batch.making import available_engine
     from manipose_mj.cli.evaluate import check_names
     from manipose_mj.console import output
-    from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, train, training_pool
+    from manipose_mj.learning.training import (
+        POLICY_FILE,
+        TrainingConfig,
+        check_folder,
+        train,
+        training_pool,
+    )
 
     check_names((task,), objects)
     config = TrainingConfig(
@@ -82,9 +91,17 @@ def train_ppo(
         policy=policy,
     )
     out = out or Path("ppo") / task.rpartition("/")[2]
+    check_folder(out, policy)
+    kept = pool is not None and pool.exists()
     with output.working_on("drawing starts"):
         drawn = training_pool(config, pool)
     console = output.standard_error()
+    if kept:
+        about = sorted({start.object_name for start in drawn.starts})
+        console.print(
+            f"{pool}: {len(drawn.starts)} starts about {', '.join(about)}; --starts and --objects are of new ones",
+            soft_wrap=True,
+        )
 
     def show(row: dict[str, float]) -> None:
         console.print(

@@ -88,26 +88,38 @@ class Trained:
             if header["format"] != _FORMAT:
                 raise InputError(f"{path}: format {header['format']}; expected {_FORMAT}")
             config = NetworkConfig(**header["network"])
-        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            network = ActorCritic(config, key=jax.random.key(0))
+            frame = header.get("frame", "handle")
+            if frame not in FRAMES:
+                raise ValueError(f"unknown frame {frame!r}")
+            return cls(
+                eqx.tree_at(lambda net: net.actor, network, _filled(network.actor, stored)),
+                Normaliser(
+                    jnp.asarray(stored["mean"]), jnp.asarray(stored["variance"]), jnp.asarray(1.0)
+                ),
+                config,
+                header["hz"],
+                header["task"],
+                header["seed"],
+                frame,
+            )
+        except KeyError as error:
+            raise InputError(
+                f"{path}: no trained policy can be read from it (lacks {error})"
+            ) from None
+        except (OSError, ValueError, TypeError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: no trained policy can be read from it ({error})") from None
-        network = ActorCritic(config, key=jax.random.key(0))
-        arrays, fixed = eqx.partition(network.actor, eqx.is_array)
-        leaves = [
-            jnp.asarray(stored[f"leaf_{i}"], jnp.float32)
-            for i in range(len(jax.tree.leaves(arrays)))
-        ]
-        actor = eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), leaves), fixed)
-        return cls(
-            eqx.tree_at(lambda net: net.actor, network, actor),
-            Normaliser(
-                jnp.asarray(stored["mean"]), jnp.asarray(stored["variance"]), jnp.asarray(1.0)
-            ),
-            config,
-            header["hz"],
-            header["task"],
-            header["seed"],
-            header.get("frame", "handle"),
-        )
+
+
+def _filled(actor: eqx.nn.MLP, stored: Mapping[str, np.ndarray]) -> eqx.nn.MLP:
+    """An actor of this shape with the numbers of a file."""
+    arrays, fixed = eqx.partition(actor, eqx.is_array)
+    leaves, structure = jax.tree.flatten(arrays)
+    read = [jnp.asarray(stored[f"leaf_{i}"], jnp.float32) for i in range(len(leaves))]
+    for i, (leaf, found) in enumerate(zip(leaves, read, strict=True)):
+        if found.shape != leaf.shape:
+            raise ValueError(f"leaf_{i} has shape {found.shape}; expected {leaf.shape}")
+    return eqx.combine(jax.tree.unflatten(structure, read), fixed)
 
 
 class TrainedPolicy:

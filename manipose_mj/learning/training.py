@@ -24,6 +24,7 @@ from manipose_mj.learning.network import NetworkConfig
 from manipose_mj.learning.ppo import Learner, Ppo, PpoConfig, Progress
 from manipose_mj.learning.trained import Trained
 from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.storage.staging import staging
 from manipose_mj.tasks.core.config import EnvConfig, Objects
 
 POLICY_FILE, CURVE_FILE = "policy.npz", "curve.json"
@@ -98,6 +99,32 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
     # Episodes are shorter than the task's.
     steps = round(config.episode / (layout.timestep * layout.substeps))
     return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
+
+
+def check_folder(out: Path, policy: Path | None = None) -> None:
+    """See that a training can write into a folder, before it spends minutes.
+
+    Args:
+      out: The folder.
+      policy: From which the training goes on; one in `out` may be replaced.
+
+    Raises:
+      InputError: It cannot be written, or holds another policy.
+    """
+    kept = out / POLICY_FILE
+    if kept.exists() and not (policy is not None and policy.exists() and policy.samefile(kept)):
+        raise InputError(
+            f"{kept}: is there already; choose another --out, or go on from it by --policy"
+        )
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        with staging(kept):
+            pass
+        for folder in new:
+            folder.rmdir()
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
 
 
 def train(

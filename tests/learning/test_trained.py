@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 
 import jax
 import jax.numpy as jnp
@@ -74,3 +75,24 @@ def test_what_is_no_trained_policy_is_refused_in_one_line(tmp_path):
     np.savez(tmp_path / "other.npz", header=np.zeros(3))
     with pytest.raises(InputError, match="no trained policy"):
         TrainedPolicy(str(tmp_path / "other.npz"))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda arrays, header: arrays.pop("leaf_1"), "lacks 'leaf_1'"),
+        (lambda arrays, header: arrays.update(leaf_0=np.zeros(3)), "leaf_0 has shape"),
+        (lambda arrays, header: header.pop("hz"), "lacks 'hz'"),
+        (lambda arrays, header: header.update(frame="knob"), "unknown frame 'knob'"),
+        (lambda arrays, header: header.update(format=9), "format 9; expected 1"),
+    ],
+)
+def test_damaged_policies_are_refused_in_one_line(change, said, file, tmp_path):
+    with np.load(file[0]) as stored:
+        arrays = dict(stored)
+    header = json.loads(bytes(arrays["header"]))
+    change(arrays, header)
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(tmp_path / "damaged.npz", **arrays)
+    with pytest.raises(InputError, match=said):
+        TrainedPolicy(str(tmp_path / "damaged.npz"))

@@ -14,7 +14,7 @@ from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
 from manipose_mj.learning.frames import frame_of
 from manipose_mj.learning.trained import Trained
-from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, training_pool
+from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, check_folder, training_pool
 from tests.places import ROOT
 
 TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
@@ -39,9 +39,30 @@ def test_tasks_with_an_object_and_a_handle_are_refused():
     assert frame_of("single_object/target_pose_shelf", {"object", "shelf"}) == "object"
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("minutes", "nan"), ("episode", "nan"), ("episode", "inf"), ("until", "2"), ("worlds", "0")],
+)
+def test_numbers_with_which_no_training_ends_are_refused(option, value, capsys):
+    assert main(["train", "ppo", TASK, f"--{option}", value]) == EXIT_INPUT
+    assert f"--{option} is {value}" in capsys.readouterr().err
+
+
+def test_a_training_replaces_no_policy_but_that_it_goes_on_from(tmp_path):
+    kept = tmp_path / "some" / "new" / POLICY_FILE
+    check_folder(kept.parent)
+    assert not list(tmp_path.iterdir())
+    kept.parent.mkdir(parents=True)
+    kept.write_bytes(b"")
+    with pytest.raises(InputError, match="is there already; choose another --out"):
+        check_folder(kept.parent, tmp_path / "other.npz")
+    check_folder(kept.parent, kept)
+    assert list(kept.parent.iterdir()) == [kept]
+    with pytest.raises(InputError, match="cannot write there"):
+        check_folder(kept)
+
+
 def test_bad_numbers_end_in_one_line(capsys):
-    assert main(["train", "ppo", TASK, "--worlds", "0"]) == EXIT_INPUT
-    assert "--worlds is 0" in capsys.readouterr().err
     missing = ["--engine", "c", "--starts", "1", "--objects", PIECES[0], "--policy", "nowhere.npz"]
     assert main(["train", "ppo", TASK, *missing]) == EXIT_INPUT
     assert "nowhere.npz: no trained policy" in capsys.readouterr().err
