@@ -12,7 +12,7 @@ import numpy as np
 from dm_control import composer
 
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
-from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions, check_seed
+from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions, check_seed, env_config
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.registry import (
     TaskSpec,
@@ -55,7 +55,7 @@ def load(
         seed.
     """
     spec = task_spec(domain, task)
-    return make(EnvConfig(spec.full_name, **config), seed, environment_kwargs=environment_kwargs)
+    return make(env_config(spec.full_name, config), seed, environment_kwargs=environment_kwargs)
 
 
 def make(

@@ -16,7 +16,7 @@ from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, how_to_install, unknown_name
-from manipose_mj.tasks.core.config import EnvConfig, EnvOptions
+from manipose_mj.tasks.core.config import EnvOptions, env_config
 
 ENGINES = ("auto", "c", "warp")
 EngineName = Literal["auto", "c", "warp"]
@@ -61,7 +61,7 @@ def make(
         seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
     require_worlds(worlds)
     chosen = available_engine(engine)
-    pool = draw_pool(EnvConfig(task, **config), list(seeds))
+    pool = draw_pool(env_config(task, config), list(seeds))
     return from_pool(pool, worlds, chosen, processes=processes, visual=visual, capacity=capacity)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Unpack
 
 import gymnasium
@@ -13,10 +13,10 @@ from gymnasium.wrappers.utils import rescale_box
 
 from manipose_mj import suite
 from manipose_mj.actions import checked_action
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
-from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, EpisodeSpec, check_seed
+from manipose_mj.tasks.core.config import EnvOptions, EpisodeSpec, check_seed, env_config
 from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.registry import TaskSpec, named_task
 from manipose_mj.tasks.goals import Goal, success
@@ -82,7 +82,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         }
         self._arguments: dict[str, Any] = {"task": spec, **own, **config}
         self.render_mode = render_mode
-        self.environment = suite.make(EnvConfig(spec.full_name, **config))
+        self.environment = suite.make(env_config(spec.full_name, config))
         self.observation_space = observation_space(self.environment.observation_spec())
         self.action_space = action_box(self.environment.action_spec())
         self._unscaled: Callable[[np.ndarray], np.ndarray] | None = None
@@ -220,8 +220,10 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
     """What a reset asks for.
 
     Raises:
-      InputError: A seed or start index is no 32-bit number, or the goal is no pose.
+      InputError: A seed or start index is no 32-bit number, the goal is no pose, or the options are no mapping.
     """
+    if not isinstance(options, Mapping):
+        raise InputError(f"reset options are {options!r}; expected a mapping of names")
     asked = {name: options[name] for name in RESET_OPTIONS if options.get(name) is not None}
     for name in options.keys() - RESET_OPTIONS - _ignored:
         _ignored.add(name)

@@ -204,6 +204,9 @@ def test_spaces_follow_the_specifications():
         ({"reward_mode": "shaped"}, "reward mode 'shaped'; did you mean sparse"),
         ({"render_mode": "rgb"}, "render mode 'rgb'"),
         ({"split": "validation"}, "split"),
+        ({"obs_mod": "state"}, "unknown option 'obs_mod'; did you mean obs_mode"),
+        ({"obs_mode": ["state", "pose"]}, r"obs_mode is \['state', 'pose'\]; expected a text"),
+        ({"obs_mode": None}, "obs_mode is None"),
     ],
 )
 def test_unknown_modes_are_one_line_with_the_nearest_names(options, said):
@@ -220,6 +223,8 @@ def test_other_wrong_input_is_one_line(env, monkeypatch):
     for goal in (np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)):
         with pytest.raises(InputError, match="goal"):
             env.reset(options={"goal": goal})
+    with pytest.raises(InputError, match="expected a mapping of names"):
+        env.reset(options=["object"])
     with pytest.raises(InputError, match="start_index is -1"):
         env.reset(options={"start_index": -1})
     with pytest.raises(InputError, match="mug_00"):

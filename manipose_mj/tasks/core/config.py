@@ -96,6 +96,22 @@ class EnvOptions(TypedDict, total=False):
     latency: float
 
 
+def env_config(task: str, options: EnvOptions) -> EnvConfig:
+    """An environment's configuration from the keywords of a front door.
+
+    Args:
+      task: `"domain/name"`.
+      options: Fields of `EnvConfig`.
+
+    Raises:
+      InputError: It has no such field, or one holds what it cannot.
+    """
+    for name in options:
+        if name not in EnvOptions.__annotations__:
+            raise unknown_name("option", name, EnvOptions.__annotations__)
+    return EnvConfig(task, **options)
+
+
 @dataclass(frozen=True)
 class EpisodeSpec:
     """What an episode is, within an environment.

@@ -46,6 +46,8 @@ def parse_modes(observations: str) -> tuple[str, ...]:
       InputError: A mode is unknown, or there is none. Keys, which have a `/`, are checked when the
         task that they are of is known.
     """
+    if not isinstance(observations, str):
+        raise InputError(f"obs_mode is {observations!r}; expected a text, such as 'state+pose'")
     parts = tuple(observations.split("+"))
     for part in parts:
         if "/" not in part and part not in MODES:
