@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
@@ -12,6 +13,9 @@ from manipose_mj.console.cluster import cluster
 from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.injected_errors import InjectedErrors
+
+if TYPE_CHECKING:
+    from manipose_mj.evaluation.records import EpisodeResult
 
 BASELINE = "baseline"
 NO_ERRORS = InjectedErrors()
@@ -194,8 +198,26 @@ def run_and_report(config, *, resume: bool) -> int:
         report = write_report(config.out, jobs=config.jobs)
     console = output.standard_output()
     console.print(output.summary_table(summarize(results)))
+    for line in policy_mistakes(results, config.out):
+        console.print(line, soft_wrap=True)
     console.print(f"report: {report}", soft_wrap=True)
     return 0
+
+
+def policy_mistakes(results: Sequence[EpisodeResult], out: Path) -> list[str]:
+    """A line for each of the three commonest reasons why episodes failed in the policy, with the first's traceback."""
+    from manipose_mj.evaluation.records import trajectory_path
+
+    failed: dict[str, list[EpisodeResult]] = {}
+    for result in results:
+        if result.failure == "policy":
+            failed.setdefault(result.reason, []).append(result)
+    lines = []
+    for reason, those in sorted(failed.items(), key=lambda each: -len(each[1]))[:3]:
+        path = trajectory_path(out, those[0].task, those[0].episode).with_suffix(".error.txt")
+        see = f"; see {path}" if path.exists() else ""
+        lines.append(f"failed in the policy, {len(those)} of {len(results)}: {reason}{see}")
+    return lines
 
 
 def check_names(tasks: tuple[str, ...], objects: tuple[str, ...]) -> list[str]:

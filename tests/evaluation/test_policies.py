@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from websockets.sync.server import serve as websocket_server
 
+from manipose_mj.cli.evaluate import policy_mistakes
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.evaluation.cards.method import method_of, method_text, sources_of
@@ -171,6 +172,8 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     assert results[0].failure == "policy" and "KeyError: 'weights'" in results[0].reason
     (note,) = tmp_path.rglob("*.error.txt")
     assert "own_policies.py" in note.read_text()
+    (line,) = policy_mistakes(results, tmp_path)
+    assert line == f"failed in the policy, 1 of 1: {results[0].reason}; see {note}"
 
 
 @pytest.mark.full
