@@ -90,6 +90,7 @@ def replay_demos(
     obs_mode: Annotated[str, arg(metavar="MODES", help_behavior_hint="")] = "",
     control_mode: Annotated[str, arg(metavar="MODE")] = "pd_joint_pos",
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
+    resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     jobs: int = CORES,
 ) -> int:
     """Replay demonstrations: without options to see that they repeat bit for bit.
@@ -99,17 +100,32 @@ def replay_demos(
       obs_mode: Observations to add, joined by +, such as rgb+pointcloud.
       control_mode: To convert the actions into.
       out: Folder for the new files; those that do not succeed any more are left out.
+      resume: Leave out tasks whose new files are there already, after an interruption.
       jobs: Episodes at the same time, one core each.
     """
     prepare_workers(jobs)
     from manipose_mj.console import output
     from manipose_mj.demos.layout import find_sets
-    from manipose_mj.demos.replay import ReplayConfig, differing_versions, lost, replay
+    from manipose_mj.demos.replay import (
+        ReplayConfig,
+        differing_versions,
+        lost,
+        replay,
+        replayed_before,
+    )
 
+    if resume and out is None:
+        raise InputError("--resume needs --out: the folder of the new files")
     config = ReplayConfig(obs_mode, control_mode, out, jobs)
     console, notes = output.standard_output(), output.standard_error()
     worst = 0
     for demos in find_sets(data):
+        if resume and (before := replayed_before(demos, config)) is not None:
+            console.print(
+                f"{demos.task}: {len(before.episodes)} are there already: {before.path}",
+                soft_wrap=True,
+            )
+            continue
         if changed := differing_versions(demos):
             notes.print(f"{demos.task}: recorded with other versions: {', '.join(changed)}")
         with output.Progress(f"replays of {demos.task}") as progress:

@@ -19,6 +19,7 @@ from manipose_mj.demos.layout import (
     DemoSet,
     current_versions,
     read_actions,
+    read_set,
     task_folder,
     trajectory_name,
     write_description,
@@ -26,7 +27,7 @@ from manipose_mj.demos.layout import (
     writing,
 )
 from manipose_mj.errors import InputError
-from manipose_mj.storage.staging import staging
+from manipose_mj.storage.staging import clear_staging, staging
 
 if TYPE_CHECKING:
     import h5py
@@ -80,6 +81,13 @@ class ReplayConfig:
         if self.out is not None and not changes:
             raise InputError("--out needs --obs-mode or --control-mode: else nothing is new")
 
+    def path(self, demos: DemoSet) -> Path | None:
+        """Of the new HDF5 file of a set; None where none is written."""
+        if self.out is None:
+            return None
+        name = trajectory_name(self.obs_mode, self.control_mode)
+        return task_folder(self.out, demos.task) / f"{name}.h5"
+
     def env_config(self, demos: DemoSet) -> EnvConfig:
         """The environment of a set's episodes, which sees what is asked for.
 
@@ -123,12 +131,12 @@ def replay(
     config.env_config(demos)  # misspelt modes
     if any(each.control_mode != RECORDED_MODE for each in demos.episodes):
         raise InputError(f"{demos.path}: is a replay already; give the file that was recorded")
-    if config.out is None:
+    path = config.path(demos)
+    if path is None:
         return _all(demos, config, None, on_progress)
-    name = trajectory_name(config.obs_mode, config.control_mode)
-    path = task_folder(config.out, demos.task) / f"{name}.h5"
     if path.exists():
-        raise InputError(f"{path}: is there already; choose another --out")
+        raise InputError(f"{path}: is there already; add --resume or choose another --out")
+    clear_staging(path.parent)
     with staging(path.parent / "replay") as parts:
         results = _all(demos, config, parts, on_progress)
         kept = [each.now for each in results if each.now is not None]
@@ -147,6 +155,23 @@ def replay(
         write_description(new)
         _join(parts, path, kept)
     return results
+
+
+def replayed_before(demos: DemoSet, config: ReplayConfig) -> DemoSet | None:
+    """What an earlier replay of a set left, whole as it is always; None where there was none.
+
+    Raises:
+      InputError: It is broken, or of another set.
+    """
+    path = config.path(demos)
+    if path is None or not path.exists():
+        return None
+    before = read_set(path)
+    seeds = {each.episode_seed for each in demos.episodes}
+    same = before.env_kwargs["objects"] == demos.env_kwargs["objects"]
+    if not same or not all(each.episode_seed in seeds for each in before.episodes):
+        raise InputError(f"{path}: is of other demonstrations; choose another --out")
+    return before
 
 
 def _join(parts: Path, path: Path, episodes: Sequence[DemoEpisode]) -> None:

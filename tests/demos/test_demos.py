@@ -302,6 +302,7 @@ def _without(path: Path, name: str, kept: int = 0) -> None:
         ("replay {tmp}", "holds no demonstrations"),
         ("replay {demos} --obs-mode state", "need --out"),
         ("replay {demos} --out {tmp}/out", "nothing is new"),
+        ("replay {demos} --resume", "--resume needs --out"),
         ("replay {demos} --obs-mode poses --out {tmp}/out", "did you mean pose"),
         ("replay {demos} --control-mode pd_ee --out {tmp}/out", "control mode 'pd_ee'"),
         ("replay {demos} --control-mode primitive --out {tmp}/out", "into whole motions"),

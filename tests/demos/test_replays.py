@@ -14,7 +14,13 @@ from manipose_mj.cli.main import main
 from manipose_mj.demos.layout import current_versions, find_sets
 from manipose_mj.demos.observation_tape import ObservationTape
 from manipose_mj.demos.record import record
-from manipose_mj.demos.replay import ReplayConfig, differing_versions, lost, replay
+from manipose_mj.demos.replay import (
+    ReplayConfig,
+    differing_versions,
+    lost,
+    replay,
+    replayed_before,
+)
 from manipose_mj.errors import InputError
 from tests.demos.recordings import config
 
@@ -38,6 +44,24 @@ def test_a_folder_of_a_recording_and_its_replays_is_the_recording(copied):
     assert [each.path for each in find_sets(copied.parent)] == [copied]
     copied.unlink()
     assert [each.path.stem for each in find_sets(copied.parent)] == [name]
+
+
+def test_a_resumed_replay_leaves_out_what_is_whole(copied, demos, tmp_path, capsys):
+    out = tmp_path / "new"
+    asked = ReplayConfig("", "pd_ee_pose", out)
+    assert replayed_before(demos, asked) is None
+    path = asked.path(demos)
+    path.parent.mkdir(parents=True)
+    for kind in (".h5", ".json"):
+        shutil.copy(copied.with_suffix(kind), path.with_suffix(kind))
+    words = ["demos", "replay", str(demos.path), "--control-mode", "pd_ee_pose", "--jobs", "1"]
+    before = path.read_bytes()
+    assert main([*words, "--out", str(out)]) == 2
+    assert "is there already; add --resume" in capsys.readouterr().err
+    assert main([*words, "--out", str(out), "--resume"]) == 0
+    assert "2 are there already" in capsys.readouterr().out and path.read_bytes() == before
+    with pytest.raises(InputError, match="is of other demonstrations"):
+        replayed_before(replace(demos, episodes=demos.episodes[:1]), asked)
 
 
 @pytest.mark.full
