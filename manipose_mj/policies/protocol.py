@@ -100,10 +100,15 @@ def checked_answer(answer: Any, size: int) -> Decision:
             raise StageFailure("policy", f"the policy answered with {names}; expected 'actions'")
         values = answer["actions"] if "actions" in answer else answer["action"]
         try:
-            done = bool(answer.get("done", False))
+            done = answer.get("done", False)
+            if isinstance(done, str | bytes):  # "no" would be true
+                raise TypeError
+            done = bool(done)
         except Exception:  # of whichever library the value is
             raise StageFailure("policy", "'done' is neither true nor false") from None
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         actions = np.asarray(values, float)
     except Exception:  # of whichever library they are
         raise StageFailure("policy", f"the actions are no numbers: {values!r:.80}") from None

@@ -45,6 +45,8 @@ def test_a_policy_may_be_done_with_or_without_a_last_action():
         (None, "shape|no numbers"),
         ([[10**400] * 8], "no numbers"),
         ({"actions": np.zeros((1, 8)), "done": np.array([True, False])}, "neither true nor false"),
+        ({"actions": np.zeros((1, 8)), "done": "no"}, "neither true nor false"),
+        ({"actions": np.full((1, 8), 1j)}, "no numbers"),
     ],
 )
 def test_other_answers_are_failures_of_the_policy(answer, said):
