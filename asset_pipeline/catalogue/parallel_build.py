@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from asset_pipeline.build.data_set import require_writable, up_to_date
@@ -82,11 +82,9 @@ def _beyond(count: int) -> Iterator[tuple[str, tuple[str, int]]]:
             yield row.instance(index), (row.name, index)
 
 
-def _chosen(
-    entries: Mapping[str, tuple[str, int]], only: Sequence[str]
-) -> dict[str, tuple[str, int]]:
+def _chosen(entries: dict[str, tuple[str, int]], only: Sequence[str]) -> dict[str, tuple[str, int]]:
     if not only:
-        return dict(entries)
+        return entries
     chosen = {}
     for name in only:
         own = {n: e for n, e in entries.items() if name in (n, e[0])}

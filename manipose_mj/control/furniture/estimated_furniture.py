@@ -109,7 +109,7 @@ class EstimatedFurniture:
                 raise StageFailure("perception", f"no camera sees enough of the {category}")
             pose = self._views.camera_pose(self._physics, self._front_cameras[0])
             cloud, asked = self._cloud(), asked_parts(self._task)
-            whole = self._cloud(self._views.cameras + self._views.wide)
+            whole = cloud.joined_by(self._cloud(self._views.wide))
             found: list[tuple[SensedFurniture, FurnitureModel]] = []
             # Through all cameras as well where what stands open did not show.
             for each in (seen, cloud):

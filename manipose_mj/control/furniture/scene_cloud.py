@@ -37,6 +37,14 @@ class SceneCloud:
         rows = self.instance == instance
         return SceneCloud(self.points[rows], self.normals[rows], self.instance[rows])
 
+    def joined_by(self, other: SceneCloud) -> SceneCloud:
+        """These points, then those of another cloud."""
+        return SceneCloud(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.normals, other.normals]),
+            np.concatenate([self.instance, other.instance]),
+        )
+
 
 @dataclass(frozen=True)
 class Sight:

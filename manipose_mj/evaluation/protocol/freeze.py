@@ -205,10 +205,11 @@ def main(arguments: list[str]) -> int:
     version, *folders = [each for each in arguments if each != "--anew"] or [VERSIONS[0]]
     if version not in VERSIONS:
         raise unknown_name("protocol", version, VERSIONS)
-    before = None if anew or not protocol_path(version).exists() else _stored(version)
-    content = (
-        document_of_assets(version, built_assets(folders)) if folders else document(version, before)
-    )
+    if folders:
+        content = document_of_assets(version, built_assets(folders))
+    else:
+        known = not anew and protocol_path(version).exists()
+        content = document(version, _stored(version) if known else None)
     path = write_protocol(version, content)
     sys.stdout.write(f"{path}: {len(content['tasks'])} tasks, sha256 {content['sha256']}\n")
     return 0
