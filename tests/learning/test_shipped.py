@@ -38,12 +38,12 @@ def test_they_are_small_and_say_what_they_are():
 @pytest.mark.parametrize(
     ("name", "pieces", "least"),
     [
-        ("open_middle_drawer", (4, 14, 19, 24), 21),  # in single environments 23, of 100 97
-        ("open_cabinet_door", (4, 9, 14, 34, 39), 21),  # 23, of 100 94
+        ("open_middle_drawer", (4, 14, 19, 24), 43),  # in single environments 97 %
+        ("open_cabinet_door", (4, 9, 14, 34, 39), 43),  # 94 %
     ],
 )
 def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, name, pieces, least):
-    """The first 24 episodes of the protocol."""
+    """Fifty episodes of the protocol: so many that rounding on another processor does not decide."""
     settings = PolicySettings(
         "manipose_mj.learning:TrainedPolicy",
         json.dumps({"path": name}),
@@ -51,11 +51,12 @@ def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, nam
         control_mode="pd_ee_pose",
         hz=5.0,
     )
-    batch = BatchSettings("c", 24)
+    batch = BatchSettings("c", 50)
     config = EvaluationConfig(
-        (f"articulated/{name}",), tmp_path, episodes=24, protocol="v1", policy=settings, batch=batch
+        (f"articulated/{name}",), tmp_path, episodes=50, protocol="v1", policy=settings, batch=batch
     )
     results = evaluate(config)
+    assert len(results) == 50
     assert {result.object for result in results} == {f"cabinet_{i:03}" for i in pieces}
     assert sum(result.success_at_end for result in results) >= least
 
@@ -69,7 +70,7 @@ def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
         *(sys.executable, "-m", "manipose_mj.cli.main", "evaluate", "example/lift"),
         *("--policy", "manipose_mj.learning:TrainedPolicy", "--policy-args", '{"path": "lift"}'),
         *("--obs-mode", "state+pose", "--control-mode", "pd_ee_pose", "--hz", "5"),
-        *("--episodes", "24", "--seed", "100", "--engine", "c", "--worlds", "24"),
+        *("--episodes", "96", "--seed", "100", "--engine", "c", "--worlds", "96"),
         *("--out", str(tmp_path), "--objects", *objects),
     )
     done = subprocess.run(
@@ -77,6 +78,6 @@ def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
     )
     assert done.returncode == 0, done.stderr
     results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
-    assert len(results) == 24
-    # In single environments 22, and of 100 90.
-    assert sum(result["success_at_end"] for result in results) >= 19
+    assert len(results) == 96
+    # In single environments 90 %.
+    assert sum(result["success_at_end"] for result in results) >= 76
