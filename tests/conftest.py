@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,6 +38,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what samples leave out, and put long files first."""
     tiers.mark_left_out(items)
     tiers.order(items)
+
+
+@pytest.fixture(autouse=True)
+def _no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Progress shows after seconds, which a busy machine takes for what a quiet one does at once."""
+    from manipose_mj.console import output
+
+    monkeypatch.setattr(output, "QUIET_S", math.inf)
 
 
 @pytest.fixture

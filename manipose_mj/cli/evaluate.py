@@ -73,7 +73,7 @@ def evaluate(
         furniture and surroundings from the simulator.
       jobs: Episodes at the same time, one core each; results do not depend on it.
       out: Folder for the results; by default a new one under manipose_results.
-      resume: Go on with the results in --out after an interruption.
+      resume: Go on with the results in --out, after an interruption or with more tasks or episodes.
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
       protocol: Frozen protocol to follow: its evaluation seeds, and its test objects; those of v1-real are scans

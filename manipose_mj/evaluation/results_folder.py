@@ -75,6 +75,12 @@ def kept_results(
 ) -> list[EpisodeResult]:
     """The results to keep, with an unfinished last line cut off the file.
 
+    Args:
+      out: The folder.
+      identity: Of this run; it may have more tasks and more episodes a task than the results were asked for.
+      file: The open results file.
+      resume: Whether results may be there.
+
     Raises:
       InputError: There are results and `resume` is False, or they belong to another configuration.
     """
@@ -84,21 +90,45 @@ def kept_results(
             f"{out}: holds {len(results)} results; add --resume or choose another --out"
         )
     if results:
-        try:
-            before = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))
-        except (FileNotFoundError, ValueError):
-            raise InputError(
-                f"{out / RUN_FILE}: missing or unreadable, so that its results cannot be "
-                "continued; choose another --out"
-            ) from None
+        before = _run_before(out)
         for name, value in identity.items():
-            if before.get(name) != value:
+            if not _goes_on(name, before.get(name), value):
                 raise InputError(
                     f"{out}: its results have {name} {before.get(name)!r}, this run has "
-                    f"{value!r}; resume with the same configuration or choose another --out"
+                    f"{value!r}; resume with the same configuration, of which tasks and episodes "
+                    "may be more, or choose another --out"
                 )
     file.truncate(size)
     return results
+
+
+def is_asked_for(out: Path, identity: dict[str, Any]) -> bool:
+    """Whether what the folder's results were asked for is this, and no less."""
+    before = _run_before(out)
+    return all(before.get(name) == value for name, value in identity.items())
+
+
+def _run_before(out: Path) -> dict[str, Any]:
+    """What the folder's results were asked for."""
+    try:
+        before = json.loads((out / RUN_FILE).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        before = None
+    if not isinstance(before, dict):
+        raise InputError(
+            f"{out / RUN_FILE}: missing or unreadable, so that its results cannot be "
+            "continued; choose another --out"
+        )
+    return before
+
+
+def _goes_on(name: str, before: Any, now: Any) -> bool:
+    """Whether results of one configuration are also some of another, which asks for no less."""
+    if name == "tasks" and isinstance(before, list):
+        return all(task in now for task in before)
+    if name == "episodes" and isinstance(before, int):
+        return before <= now
+    return before == now
 
 
 def append_result(file: IO[bytes], result: EpisodeResult) -> None:

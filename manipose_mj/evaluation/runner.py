@@ -36,6 +36,7 @@ from manipose_mj.evaluation.results_folder import (
     RUN_FILE,
     SUMMARY_FILE,
     append_result,
+    is_asked_for,
     kept_results,
     results_file,
 )
@@ -133,7 +134,8 @@ def evaluate(
 
     Args:
       config: What to run.
-      resume: Keep the results that `config.out` holds and run only what is missing.
+      resume: Keep the results that `config.out` holds and run only what is missing: of a run that was cut short, or
+        of one with fewer tasks or episodes.
       runner: Runs one episode; None: in MuJoCo.
       on_progress: Called with the results so far and the number wanted, first before any runs.
 
@@ -158,7 +160,8 @@ def evaluate(
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), results_file(config.out) as file:
         results = kept_results(config.out, identity, file, resume=resume)
-        if not results:
+        if not results or not is_asked_for(config.out, identity):
+            (config.out / SUMMARY_FILE).unlink(missing_ok=True)  # of fewer episodes
             run = {
                 **identity,
                 "masks": config.mask_source,

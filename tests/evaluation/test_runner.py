@@ -134,12 +134,32 @@ def test_results_are_never_overwritten(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("change", "named"),
-    [({"seed": 1}, "seed"), ({"episodes": 7}, "episodes"), ({"objects": ("bowl_000",)}, "objects")],
+    [
+        ({"seed": 1}, "seed"),
+        ({"episodes": 5}, "episodes"),
+        ({"tasks": fake.TASKS[:1]}, "tasks"),
+        ({"objects": ("bowl_000",)}, "objects"),
+    ],
 )
 def test_resume_refuses_another_configuration(tmp_path: Path, change: dict, named: str) -> None:
     evaluate(config(tmp_path), runner=fake.make_runner())
     with pytest.raises(InputError, match=f"its results have {named} "):
         evaluate(config(tmp_path, **change), resume=True, runner=fake.make_runner())
+
+
+def test_resume_adds_tasks_and_episodes(tmp_path: Path) -> None:
+    diary = tmp_path / "diary"
+    out = tmp_path / "out"
+    evaluate(config(out, tasks=fake.TASKS[:1], episodes=2), runner=fake.make_runner())
+    more = evaluate(config(out), resume=True, runner=fake.make_runner(diary=diary))
+    assert len(diary.read_text().splitlines()) == 10
+    whole = evaluate(config(tmp_path / "whole"), runner=fake.make_runner())
+    assert [result.seed for result in more] == [result.seed for result in whole]
+    assert timeless(out / "results.jsonl") == timeless(tmp_path / "whole" / "results.jsonl")
+    run = json.loads((out / "run.json").read_text())
+    assert (run["tasks"], run["episodes"]) == (sorted(fake.TASKS), 6)
+    assert "--episodes 6" in run["command"]
+    assert len(json.loads((out / "summary.json").read_text())["tasks"]) == len(fake.TASKS)
 
 
 def test_a_broken_line_before_the_last_is_an_error(tmp_path: Path) -> None:
