@@ -9,12 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from manipose_mj.console.process import same_rounding_on_all_processors
 from tests import tiers
 from tests.array_checks import install_array_checks
 
 # Before NumPy loads: xdist gives every core a worker, and threads on top only slow each other down.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+# What passes on one processor passes on others.
+same_rounding_on_all_processors()
 
 # Shared by the workers and kept between runs, so that objects are built once.
 _KEPT = Path(__file__).parents[1] / ".pytest_cache"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import platform
 import warnings
+from pathlib import Path
 
 from manipose_mj.errors import InputError
 
@@ -17,6 +19,23 @@ def one_thread_per_process() -> None:
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+
+
+_CPU_INFO = Path("/proc/cpuinfo")
+
+
+def same_rounding_on_all_processors() -> None:
+    """Have BLAS and NumPy compute as on any x86-64 processor with AVX2; no effect once NumPy is loaded, nor elsewhere.
+
+    Both choose other instructions where a processor has more, which round differently in the last bits. What happens in
+    a pile of objects can depend on them.
+    """
+    if platform.machine().lower() not in ("x86_64", "amd64") or not _CPU_INFO.is_file():
+        return
+    if " avx2 " in _CPU_INFO.read_text(encoding="utf-8", errors="replace"):
+        os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
+        # As NumPy 2.4 names them; https://numpy.org/doc/stable/reference/simd/build-options.html
+        os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", "X86_V4 AVX512_ICL AVX512_SPR")
 
 
 def prepare_workers(jobs: int) -> None:

@@ -65,7 +65,7 @@ def verify(
     jobs: int,
     assets: tuple[str, ...] = (),
 ) -> Iterator[tuple[Key, Certificate | str]]:
-    """Replay certificates; each that still solves its start, or the reason why it does not."""
+    """Replay certificates: each that still solves its start, another that does where it does not, or why none does."""
     solved = known.solved
     yield from _in_parallel(((version, start, solved[start], assets) for start in starts), jobs)
 
@@ -79,15 +79,18 @@ def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate
 def _outcome(
     version: str, start: Key, certificate: Certificate | None, assets: tuple[str, ...] = ()
 ) -> tuple[Key, Certificate | str]:
-    """Play a start by a certificate; without one, look for one."""
+    """Play a start by a certificate, then by all that `certify` tries; what solves it, or why the last did not."""
     # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
     logging.getLogger("absl").setLevel(logging.ERROR)
     task, number = start
     frozen = load(version).episode(task, number)
     objects = pool_folders(version, task, assets)
     config = EnvConfig(task, obs_mode="state", split="test", objects=objects)
+    tried = attempts(frozen.seed)
+    if certificate is not None:
+        tried = (certificate, *(attempt for attempt in tried if attempt != certificate))
     reason = ""
-    for attempt in attempts(frozen.seed) if certificate is None else (certificate,):
+    for attempt in tried:
         try:
             result, _ = run_episode(
                 config,

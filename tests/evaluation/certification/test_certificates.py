@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -134,7 +135,10 @@ def test_commands_find_and_replay(tmp_path, capsys):
     assert main(["protocol", "certify", "--out", out, *chosen]) == 0
     assert "1 certified, 0 unsolved" in capsys.readouterr().out
     assert main(["protocol", "verify", "--certificates", out, *chosen]) == 0
-    assert "1 of 1 certificates hold; of 1 starts" in capsys.readouterr().out
+    assert (
+        "1 of 1 certificates hold, 0 starts are solved by other samples, 0 by none"
+        in capsys.readouterr().out
+    )
     assert main(["protocol", "certify", "--out", str(tmp_path / "no" / "c.json"), *chosen]) == 2
 
 
@@ -142,17 +146,42 @@ def test_a_certificate_that_no_longer_holds_is_exit_1_with_its_reason(
     tmp_path, capsys, monkeypatch
 ):
     known = Certificates("v1")
-    for number in (0, 1):
+    for number in (0, 1, 3):
         known = known.with_outcome((TASK, number), Certificate(number, MAX_PLANS))
     save_certificates(known.with_outcome((TASK, 2), "plan: no grasp"), V1, tmp_path / "c.json")
-    outcomes = [((TASK, 1), known.solved[TASK, 1]), ((TASK, 0), "grasp: it slipped")]
+    outcomes = [((TASK, 1), known.solved[TASK, 1]), ((TASK, 3), Certificate(9, 15))]
     monkeypatch.setattr(search, "verify", lambda *_: iter(outcomes))
-    words = ["--tasks", TASK, "--episodes", "4", "--certificates", str(tmp_path / "c.json")]
+    words = ["--tasks", TASK, "--episodes", "5", "--certificates", str(tmp_path / "c.json")]
+    assert main(["protocol", "verify", *words]) == 0
+    said, told = capsys.readouterr()
+    other = f"{TASK} 3: its certificate does not hold here; solved by planner seed 9 and 15 plans"
+    assert other in said and other in told  # as it is found
+    outcomes.append(((TASK, 0), "grasp: it slipped"))
     assert main(["protocol", "verify", *words]) == 1
     said, told = capsys.readouterr()
-    assert f"{TASK} 0: grasp: it slipped" in said
-    assert f"{TASK} 0: grasp: it slipped" in told  # as it is found
-    assert "1 of 2 certificates hold; of 4 starts, 1 are known as unsolved and 1 untried" in said
+    assert f"{TASK} 0: grasp: it slipped" in said and f"{TASK} 0: grasp: it slipped" in told
+    assert (
+        "1 of 3 certificates hold, 1 starts are solved by other samples, 1 by none; of 5 starts, "
+        "1 are known as unsolved and 1 untried" in said
+    )
+
+
+def test_where_a_certificate_does_not_hold_other_samples_are_tried(monkeypatch):
+    played = []
+
+    def solved_by_the_last(config, spec, *, planner_seed, plans, **_):
+        played.append(Certificate(planner_seed, plans))
+        succeeded = plans == attempts(0)[-1].plans
+        return SimpleNamespace(success_at_end=succeeded, failure="grasp", reason="slipped"), None
+
+    monkeypatch.setattr(search, "run_episode", solved_by_the_last)
+    start = (TASK, 0)
+    tried = attempts(V1.episode(*start).seed)
+    assert search._outcome("v1", start, tried[0]) == (start, tried[-1])
+    assert played == list(tried)
+    assert search._outcome("v1", start, tried[-1]) == (start, tried[-1])
+    monkeypatch.setattr(search, "attempts", lambda seed: tried[:2])
+    assert search._outcome("v1", start, tried[1]) == (start, "grasp: slipped")
 
 
 def test_a_start_that_cannot_be_drawn_is_unsolved_and_stops_nothing(monkeypatch):
