@@ -10,8 +10,8 @@ from tyro.extras import SubcommandApp
 
 from manipose_mj.console.process import (
     CORES,
+    keep_to_avx2,
     prepare_workers,
-    same_rounding_on_all_processors,
 )
 from manipose_mj.errors import InputError
 
@@ -54,7 +54,7 @@ def verify_protocol(
       assets: Folders of assets built from the data sets of v1-real.
     """
     prepare_workers(jobs)
-    same_rounding_on_all_processors()
+    keep_to_avx2()
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import load_certificates
     from manipose_mj.evaluation.certification.search import chosen_starts, verify
@@ -119,7 +119,7 @@ def certify_protocol(
       assets: Folders of assets built from the data sets of v1-real.
     """
     prepare_workers(jobs)
-    same_rounding_on_all_processors()
+    keep_to_avx2()
     from manipose_mj.console import output
     from manipose_mj.evaluation.certification.certificates import (
         causes,

@@ -24,8 +24,8 @@ def one_thread_per_process() -> None:
 _CPU_INFO = Path("/proc/cpuinfo")
 
 
-def same_rounding_on_all_processors() -> None:
-    """Have BLAS and NumPy compute as on any x86-64 processor with AVX2; no effect once NumPy is loaded, nor elsewhere.
+def keep_to_avx2() -> None:
+    """Have BLAS and NumPy use no instructions beyond AVX2, on Linux on x86-64; no effect once NumPy is loaded, nor elsewhere.
 
     Both choose other instructions where a processor has more, which round differently in the last bits. What happens in
     a pile of objects can depend on them.

@@ -1,4 +1,4 @@
-"""What a command asks of BLAS and NumPy, so that processors agree to the last bit."""
+"""Which instructions a command asks of BLAS and NumPy, as others round differently."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from manipose_mj.console import process
 
 NAMES = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 TOLD = """
-from manipose_mj.console.process import same_rounding_on_all_processors
-same_rounding_on_all_processors()
+from manipose_mj.console.process import keep_to_avx2
+keep_to_avx2()
 from numpy._core._multiarray_umath import __cpu_dispatch__ as known, __cpu_features__ as found
 print([name for name in known if found[name]])
 """
@@ -48,11 +48,11 @@ def test_only_processors_with_avx2_are_told(monkeypatch, tmp_path, machine, flag
     info.write_text(f"flags : fpu {flags} sha_ni\n")
     monkeypatch.setattr(process, "_CPU_INFO", info)
     monkeypatch.setattr(platform, "machine", lambda: machine)
-    process.same_rounding_on_all_processors()
+    process.keep_to_avx2()
     assert [name in os.environ for name in NAMES] == [set_, set_]
 
 
 def test_what_users_say_stays(monkeypatch):
     monkeypatch.setenv(NAMES[0], "Zen")
-    process.same_rounding_on_all_processors()
+    process.keep_to_avx2()
     assert os.environ[NAMES[0]] == "Zen"
