@@ -12,8 +12,8 @@ from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import is_level, usual_swing
-from manipose_mj.control.furniture.furniture_fit import fit_furniture
+from manipose_mj.control.furniture.fit.door_hinge import is_level, usual_swing
+from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra

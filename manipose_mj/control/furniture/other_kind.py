@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import is_straight, likely_hinge
-from manipose_mj.control.furniture.furniture_fit import TYPICAL_DRAWER, cavity_behind, usual_swing
+from manipose_mj.control.furniture.fit.door_hinge import is_straight, likely_hinge
+from manipose_mj.control.furniture.fit.furniture_fit import (
+    TYPICAL_DRAWER,
+    cavity_behind,
+    usual_swing,
+)
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 
 # Cosine between a hinge and the way out of the front, from which on a part would turn as a knob does.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipose_mj.assets.asset import MovingPart
-from manipose_mj.control.furniture.door_hinge import WITH_KNOBS
+from manipose_mj.control.furniture.fit.door_hinge import WITH_KNOBS
 from manipose_mj.tasks.articulated.part_choice import kind_of, rows_of
 from manipose_mj.tasks.instructions.names import ORDINALS, part_words_among
 

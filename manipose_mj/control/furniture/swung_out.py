@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from manipose_mj.control.furniture.furniture_fit import fit_furniture
+from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import front_of

@@ -11,22 +11,21 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Cavity, MovingPart
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import WITH_KNOBS, usual_swing, whole_front
-from manipose_mj.control.furniture.object_frame import object_pose
+from manipose_mj.control.furniture.fit.door_hinge import WITH_KNOBS, usual_swing, whole_front
+from manipose_mj.control.furniture.fit.handle_claims import claim, missed
+from manipose_mj.control.furniture.fit.object_frame import object_pose
+from manipose_mj.control.furniture.fit.shut_part import (
+    FACING,
+    ShutPart,
+    between_neighbours,
+    panel_place,
+)
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import handle_boxes, handle_label
 from manipose_mj.control.furniture.shapes.relief import relief
-from manipose_mj.control.furniture.shut_part import (
-    FACING,
-    ShutPart,
-    between_neighbours,
-    claim,
-    missed,
-    panel_place,
-)
 from manipose_mj.poses import invert, transform
 
 # How far drawers open in the median of the training furniture: of the depth, [m].

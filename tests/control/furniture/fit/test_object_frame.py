@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.object_frame import object_pose
+from manipose_mj.control.furniture.fit.object_frame import object_pose
 from manipose_mj.control.furniture.part_sensing import SensedFurniture
 from tests.control.furniture.synthetic import HALF, HEIGHT, body, cloud, door, rectangle
 

@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.door_hinge import (
+from manipose_mj.control.furniture.fit.door_hinge import (
     can_be_a_door,
     hung,
     is_level,
     likely_hinge,
     whole_front,
 )
-from manipose_mj.control.furniture.object_frame import AJAR
+from manipose_mj.control.furniture.fit.object_frame import AJAR
 from manipose_mj.control.furniture.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import motion_of
 from manipose_mj.control.furniture.shapes.handle_shape import (
@@ -27,7 +27,7 @@ from manipose_mj.control.furniture.shapes.handle_shape import (
     handle_label,
     this_side_up,
 )
-from manipose_mj.control.furniture.shapes.relief import Bump, Relief
+from manipose_mj.control.furniture.shapes.relief import Bump
 from manipose_mj.control.furniture.shapes.standing_out import column_of, twin_of
 from manipose_mj.poses import compose, invert, transform
 
@@ -43,9 +43,6 @@ _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
 _USUAL_HALF, _BESIDE = 0.05, 0.005
-# How near a handle what stands out of the front is the handle, and how far from where it was sensed it may be [m]; the
-# confidence of what was not sensed.
-_AT_HANDLE, _FAR, _MISSED = 0.03, 0.60, 0.12
 _KNOBS = 0.5  # cosine between the axis of a knob and X, at least
 _MISPLACED = 0.12  # how far a handle is from where it was estimated, at most [m]
 _ABOVE_BAR = 0.05  # how far above its bar the front of an appliance's door or drawer ends [m]
@@ -55,7 +52,7 @@ _LONG = 1.5  # times as long as wide: a bar
 _KNOWN, _TWIN = 0.04, 0.8
 _SURE = 0.25  # confidence of drawers that tell of others in their column, or row
 # How far handles in a row differ in height, and in half of their lengths [m].
-_LEVEL, _ALIKE = 0.015, 0.010
+_LEVEL, ALIKE = 0.015, 0.010
 
 
 class ShutPart:
@@ -252,7 +249,7 @@ class ShutPart:
         """Whether a sure drawer has a handle of the same size at the same height, and both show."""
         if other is self or not (self.measured and other.measured):
             return False
-        alike = np.abs(other.half - self.half).max() < _ALIKE
+        alike = np.abs(other.half - self.half).max() < ALIKE
         level = abs(float(other.handle[2, 3] - self.handle[2, 3])) < _LEVEL
         sure = other.kind == "slide" and other.sensed.confidence >= _SURE
         return sure and bool(alike and level)
@@ -295,58 +292,6 @@ class ShutPart:
         self.handle[:3, :3] = along_axes(self.handle[:3, :3], float(np.cos(_MISSWUNG)))
 
 
-def claim(shut: Sequence[ShutPart], relief: Relief, points: Float[np.ndarray, "n 3"]) -> None:
-    """Give handles what stands out of the front where they were sensed, or else nearest to it; the surest choose first.
-
-    A handle stays where it was sensed if cameras do not see that nothing stands out there.
-
-    Args:
-      shut: Parts as they were sensed.
-      relief: Of the front.
-      points: Of the furniture, object frame [m].
-    """
-    free = list(relief.bumps)
-    parts = [part for part in shut if part.opening == 0.0 and not part.sensed.certain]
-    parts.sort(key=lambda part: -part.sensed.confidence)
-    for most in (_AT_HANDLE, _FAR):
-        for part in parts:
-            place = part.handle[:3, 3]
-            if part.base is not None or not free or (most == _FAR and not relief.shows(place)):
-                continue
-            nearest = min(free, key=lambda bump: bump.beside(place))
-            if nearest.beside(place) < most:
-                part.take(nearest, points)
-                free = [bump for bump in free if bump is not nearest]
-
-
-def missed(
-    shut: Sequence[ShutPart], relief: Relief, points: Float[np.ndarray, "n 3"]
-) -> list[ShutPart]:
-    """Parts of what stands out of the front and is no handle of these, of little confidence; arguments as of `claim`."""
-    taken = [part.handle[:3, 3] for part in shut]
-    free = [b for b in relief.bumps if all(b.beside(place) > _AT_HANDLE for place in taken)]
-    return [_missed_part(bump, shut, points) for bump in free] if shut else []
-
-
-def _missed_part(
-    bump: Bump, shut: Sequence[ShutPart], points: Float[np.ndarray, "n 3"]
-) -> ShutPart:
-    """A part by its handle alone: of the kind of that whose handle is as large, or a door."""
-    like = max(shut, key=lambda part: part.sensed.confidence)
-    handle = compose(like.pose[:3, :3] @ ACROSS_FRONT, transform(like.pose, bump.middle[None])[0])
-    sensed = replace(like.sensed, handle=handle, opening=0.0, confidence=_MISSED)
-    part = ShutPart(sensed, like.pose)
-    part.take(bump, points)
-    alike = [o for o in shut if o.measured and np.abs(o.half - part.half).max() < _ALIKE]
-    near = min(
-        alike, key=lambda o: float(np.linalg.norm(o.handle[:3, 3] - bump.middle)), default=None
-    )
-    part.kind = "hinge" if near is None else near.kind
-    # A hinge is looked for where a door's is likely to be.
-    part.axis, part.origin = np.array([1.0, 0.0, 0.0]), part.handle[:3, 3].copy()
-    return part
-
-
 def _snapped(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     nearest = int(np.abs(axis).argmax())
     if abs(axis[nearest]) < _SNAP:
@@ -379,7 +324,7 @@ def between_neighbours(
     own, half = part.handle[:3, 3], part.half
     for other in others:
         bar = other.bar_on_top and other.is_bar and part.is_bar
-        bar = bar and float(np.abs(other.half - part.half).max()) < _ALIKE
+        bar = bar and float(np.abs(other.half - part.half).max()) < ALIKE
         if other is part or not other.shows or (other.sensed.confidence < 0.15 and not bar):
             continue
         away = other.handle[:3, 3] - own

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.door_hinge import (
+from manipose_mj.control.furniture.fit.door_hinge import (
     can_be_a_door,
     hung,
     likely_hinge,

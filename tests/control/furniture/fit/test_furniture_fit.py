@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.furniture_fit import fit_furniture
+from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
