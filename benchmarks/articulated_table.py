@@ -3,7 +3,7 @@
     python benchmarks/articulated_table.py --assets DIR --json FILE --pictures DIR
 
 The catalogue's test furniture, and built assets such as PartNet-Mobility's, never trained on: one view from
-before the front, and three fused. Shares are of the parts whose handle shows.
+before the front, and three fused. Shares are of the parts whose handle shows. The network alone, and with the fit of furniture.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from jaxtyping import PRNGKeyArray
 
 from manipose_mj.console.process import CORES, one_thread_per_process
 
 one_thread_per_process()
 
-from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator  # noqa: E402
+from manipose_mj.control.furniture.furniture_estimator import FurnitureEstimator  # noqa: E402
+from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, PartEstimate  # noqa: E402
 from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes  # noqa: E402
 from manipose_mj.ppf_jax.data.articulated.cache import furniture_names, furniture_scenes  # noqa: E402
 from manipose_mj.ppf_jax.data.articulated.clouds import (  # noqa: E402
@@ -29,7 +31,7 @@ from manipose_mj.ppf_jax.data.articulated.clouds import (  # noqa: E402
     FurnitureScene,
     handle_poses,
 )
-from manipose_mj.ppf_jax.evaluation.part_evaluation import evaluated, scene_clouds  # noqa: E402
+from manipose_mj.ppf_jax.evaluation.part_evaluation import PartFinder, evaluated, scene_clouds  # noqa: E402
 from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors, part_errors, summary  # noqa: E402
 
 _WORST = 10
@@ -49,6 +51,7 @@ def main() -> None:
         estimator = ArticulatedEstimator.load()
     else:
         estimator = ArticulatedEstimator.from_file(options.weights)
+    finders = {"network": (estimator, 0.5), "fitted": (_Fitted(estimator), 0.1)}
     names = furniture_names("test")
     sets = {"catalogue": furniture_scenes(names, "front", scenes=options.scenes, jobs=options.jobs)}
     if options.assets is not None:
@@ -58,13 +61,30 @@ def main() -> None:
     rows = []
     for which, scenes in sets.items():
         for fused in options.fused:
-            rows += _rows(estimator, which, scenes, fused, options.pictures)
-            if options.json is not None:
-                options.json.write_text(json.dumps(rows, indent=1) + "\n")
+            for name, (finder, least) in finders.items():
+                rows += _rows(name, finder, least, which, scenes, fused, options.pictures)
+                if options.json is not None:
+                    options.json.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+class _Fitted:
+    """The network and the fit, told the category of the furniture in each cloud."""
+
+    def __init__(self, network: ArticulatedEstimator) -> None:
+        self._whole = FurnitureEstimator(network)
+
+    def estimate_many(
+        self, clouds: Sequence[FurnitureCloud], *, key: PRNGKeyArray, least: float
+    ) -> list[list[PartEstimate]]:
+        """As of `PartFinder`."""
+        categories = [cloud.scene.category for cloud in clouds]
+        return self._whole.estimate_many(clouds, categories, key=key, least=least)
 
 
 def _rows(
-    estimator: ArticulatedEstimator,
+    name: str,
+    estimator: PartFinder,
+    least: float,
     which: str,
     scenes: Sequence[FurnitureScene],
     fused: int,
@@ -72,7 +92,7 @@ def _rows(
 ) -> list[dict]:
     clouds = scene_clouds(scenes, fused=fused)
     begun = time.process_time()
-    found = evaluated(estimator, clouds)
+    found = evaluated(estimator, clouds, least=least)
     spent = time.process_time() - begun
     owner = {scene.name: scene for scene in scenes}
     kinds = ["all", *dict.fromkeys(scene.category for scene in scenes)]
@@ -81,7 +101,7 @@ def _rows(
         own = [e for e in found.errors if kind in ("all", owner[e.name.split(" ")[0]].category)]
         if not own:
             continue
-        row = {"objects": which, "views": fused, "category": kind} | summary(own, 0, 1)
+        row = {"objects": which, "views": fused, "by": name, "category": kind} | summary(own, 0, 1)
         del row["false_positives_per_cloud"]
         if kind == "all":
             row["false_positives_per_cloud"] = found.false_positives / found.clouds
@@ -96,7 +116,7 @@ def _rows(
         )
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
-        _draw(estimator, clouds, found.errors, pictures / f"{which}-{fused}.png")
+        _draw(estimator, least, clouds, found.errors, pictures / f"{which}-{fused}-{name}.png")
     return rows
 
 
@@ -108,7 +128,8 @@ def _badness(errors: PartErrors) -> float:
 
 
 def _draw(
-    estimator: ArticulatedEstimator,
+    estimator: PartFinder,
+    least: float,
     clouds: Sequence[FurnitureCloud],
     errors: Sequence[PartErrors],
     path: Path,
@@ -129,7 +150,7 @@ def _draw(
     for name, plot in zip(chosen, axes.ravel(), strict=False):
         cloud = next(c for c in clouds if c.scene.name == name)
         # As `evaluated` pads, any batch will do: an answer depends on the key and the cloud alone.
-        found = estimator.estimate(cloud, key=jax.random.key(0))
+        found = estimator.estimate_many([cloud], key=jax.random.key(0), least=least)[0]
         few = slice(0, 5000)
         colour = np.where(cloud.handle, 2, np.minimum(cloud.part, 0) + 1)[few]
         flat = cloud.points[few, :2] / cloud.points[few, 2:]

@@ -152,7 +152,7 @@ def estimate_rows(
     checked = []
     for number, cloud in enumerate(clouds):
         try:
-            checked.append(_checked(cloud, jax.random.fold_in(key, number)))
+            checked.append(checked_furniture(cloud, jax.random.fold_in(key, number)))
         except InputError as error:
             raise InputError(
                 f"cloud {number}: {error}" if len(clouds) > 1 else str(error)
@@ -183,8 +183,12 @@ def _parts(row: Row, least: float) -> list[PartEstimate]:
     ]
 
 
-def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
-    """At most `CLOUD_POINTS` points and their unit normals."""
+def checked_furniture(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray]:
+    """At most `CLOUD_POINTS` points and their unit normals, estimated where it has none.
+
+    Raises:
+      InputError: The cloud cannot be used.
+    """
     points, normals = checked_cloud(
         cloud, fewest=MIN_POINTS, shortest=_SHORTEST, longest=_LONGEST, what="furniture"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -74,14 +75,30 @@ def sense_parts(
       InputError: The cloud shows too little of it.
     """
     from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, estimate_rows
+    from manipose_mj.ppf_jax.points.cloud_input import Cloud
 
     to_camera = invert(camera_pose)
-    local = _Cloud(
+    local = Cloud(
         transform(to_camera, cloud.points).astype(np.float32),
         (cloud.normals @ camera_pose[:3, :3]).astype(np.float32),
     )
     up = camera_pose[2, :3]
     row = estimate_rows(ArticulatedEstimator.load().model, [local], key=key, up=tuple(up))[0]
+    return sensed_furniture(row, camera_pose)
+
+
+def sensed_furniture(
+    row: Mapping[str, np.ndarray], camera_pose: Float[np.ndarray, "4 4"]
+) -> SensedFurniture:
+    """What the estimator of parts found, taken out of the camera's frame.
+
+    Args:
+      row: As of `articulated_estimator.estimate_rows`.
+      camera_pose: `T_world_camera`.
+
+    Raises:
+      InputError: The front faces up or down.
+    """
     turn = camera_pose[:3, :3]
     parts = [
         SensedPart(
@@ -96,12 +113,6 @@ def sense_parts(
     ]
     front = turn @ row["body"][:, 0].astype(float)
     return SensedFurniture(_level(front), tuple(_distinct(parts)))
-
-
-@dataclass(frozen=True)
-class _Cloud:
-    points: Float[np.ndarray, "n 3"]
-    normals: Float[np.ndarray, "n 3"]
 
 
 def _distinct(parts: list[SensedPart]) -> list[SensedPart]:

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
 from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
 from manipose_mj.control.furniture.scene_cloud import SceneCloud
-from manipose_mj.control.furniture.shapes.body_shape import front_of
+from manipose_mj.control.furniture.shapes.body_shape import foremost, front_of
 from manipose_mj.control.furniture.shapes.door_line import DoorLine, longest_line
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT
@@ -34,9 +34,9 @@ _ONE_FACE = 0.006  # how far points of a face are from it [m]
 _MISTURNED, _CLEARLY_MORE = 0.1, 1.5
 _FACES = 0.7  # cosine between their normals and the face's, at least
 _BEHIND = (0.03, 0.3)  # how far behind the front the sides of the body are looked for [m]
-# Of the front of the body: cosine of its normals and X, at least; how far it may be from where it is thought to be, bins in
-# which its points are counted [m], their share of the fullest bin's, and how many there are.
-_FRONT_FACES, _MISTAKEN, _BIN, _SHARE, _FEWEST = 0.9, 0.2, 0.005, 0.3, 60
+# Of the front of the body: cosine of its normals and X, at least; how far it may be from where it is thought to be, and bins
+# in which points are counted [m].
+_FRONT_FACES, _MISTAKEN, _BIN = 0.9, 0.2, 0.005
 _EDGE = 0.06  # how far hinges are from a side of the body [m]
 _GAP = 0.08  # how far from its hinge a door begins to show, at most [m]
 _HANDLE = (0.012, 0.08)  # how far points of a handle are before the panel [m]
@@ -223,7 +223,8 @@ def _swung(
         return None
     rest = np.abs(line.before(flat)) > 2 * _PLANE
     facing = points[rest & (normals[:, 0] > _FRONT_FACES), 0]
-    front = _foremost(facing, front)
+    seen = foremost(facing, front, _MISTAKEN)
+    front = front if seen is None else seen
     body = (points[:, 0] < front - _BEHIND[0]) & (points[:, 0] > front - _BEHIND[1])
     if body.sum() < _LEAST:
         return None
@@ -331,18 +332,6 @@ def _rim_depth(facing: Float[np.ndarray, "n"], front: float) -> float:
         return _THICKNESS
     place = edges[int(counts.argmax())] + _BIN / 2
     return float(np.median(behind[np.abs(behind - place) < _BIN]))
-
-
-def _foremost(facing: Float[np.ndarray, "n"], about: float) -> float:
-    """The foremost of the places along X where much faces out of the front, about where that is thought to be [m]."""
-    near = facing[np.abs(facing - about) < _MISTAKEN]
-    edges = np.arange(about - _MISTAKEN, about + _MISTAKEN + _BIN, _BIN)
-    counts = np.convolve(np.histogram(near, edges)[0], np.ones(2), mode="same")
-    many = np.flatnonzero(counts > max(_FEWEST, _SHARE * counts.max()))
-    if not len(many):
-        return about
-    place = edges[many[-1]]
-    return float(np.median(near[np.abs(near - place) < 2 * _BIN]))
 
 
 def _walled(

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, PRNGKeyArray
 
 from manipose_mj.ppf_jax.articulated.model import ArticulatedModel
-from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, estimate_rows
+from manipose_mj.ppf_jax.articulated_estimator import PartEstimate, estimate_rows
 from manipose_mj.ppf_jax.data.articulated.cache import FRONT_VIEWS
 from manipose_mj.ppf_jax.data.articulated.clouds import FurnitureCloud, FurnitureScene, fused_cloud
 from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors, part_errors
@@ -21,6 +22,16 @@ BATCH = 16
 
 
 _ROUNDS, _RIDGE = 30, 1e-2
+
+
+class PartFinder(Protocol):
+    """What is evaluated: finds the parts in clouds, as `ArticulatedEstimator` does."""
+
+    def estimate_many(
+        self, clouds: Sequence[FurnitureCloud], *, key: PRNGKeyArray, least: float
+    ) -> list[list[PartEstimate]]:
+        """Of each cloud the parts of at least this confidence."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,7 @@ def scene_clouds(scenes: Sequence[FurnitureScene], *, fused: int = 1) -> list[Fu
 
 
 def evaluated(
-    estimator: ArticulatedEstimator,
+    estimator: PartFinder,
     clouds: Sequence[FurnitureCloud],
     *,
     least: float = 0.5,
@@ -53,7 +64,7 @@ def evaluated(
     """Errors over clouds.
 
     Args:
-      estimator: Trained.
+      estimator: Whose.
       clouds: At least one.
       least: Confidence from which on an estimate counts.
       seed: Of what the estimator draws.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -19,6 +20,14 @@ class OrientedCloud(Protocol):
 
     @property
     def normals(self) -> Float[np.ndarray, "n 3"]: ...
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """The plainest of them. Attributes: points `(n, 3)` [m]; normals `(n, 3)`, unit."""
+
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
 
 
 AnyCloud: TypeAlias = OrientedCloud | Float[np.ndarray, "n 3"]

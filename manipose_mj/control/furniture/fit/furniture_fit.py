@@ -77,6 +77,7 @@ def fit_furniture(cloud: SceneCloud, sensed: SensedFurniture, category: str) -> 
             part.meet_front(points, normals, float(bounds[1, 0]))
     for part in shut:
         part.meet_swing(points, normals)
+        part.meet_panel(points, normals)
     parts = [
         _part(number, part, shut, points, normals, bounds, category)
         for number, part in enumerate(shut)

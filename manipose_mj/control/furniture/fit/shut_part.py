@@ -27,6 +27,7 @@ from manipose_mj.control.furniture.shapes.handle_shape import (
     handle_label,
     this_side_up,
 )
+from manipose_mj.control.furniture.shapes.open_panel import hinge_of_panel
 from manipose_mj.control.furniture.shapes.relief import Bump
 from manipose_mj.control.furniture.shapes.standing_out import column_of, twin_of
 from manipose_mj.poses import compose, invert, transform
@@ -39,6 +40,10 @@ _MISTAKEN = 0.05  # how far the estimated opening of a drawer may be off [m]
 _BESIDE_HANDLE, _MISSWUNG = 0.15, 0.45
 # How far a hinge is off an edge of its panel that is taken to be at it: at least, and within it at most [m].
 _OFF_EDGE, _OFF_FLAP, _INSIDE, _INSIDE_FLAP = 0.04, 0.015, 0.10, 0.20
+# What is flush below the hinge of a flap no higher than this may be so high; below higher ones a plinth stands back [m].
+_LOW, _SILL = 0.50, 0.09
+# How far from where an open panel shows its hinge an estimate may be to stay [m], by whether it is of this confidence.
+_AGREE, _RELIED_ON = {False: 0.025, True: 0.08}, 0.6
 _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
@@ -231,7 +236,10 @@ class ShutPart:
         beyond = side * (self.origin[across] - edge)
         # Beside an upright hinge there may be another door, whose handle was not found.
         inside = _INSIDE_FLAP if across == 2 else _INSIDE
-        if abs(beyond) > (_OFF_FLAP if across == 2 else _OFF_EDGE) and beyond > -inside:
+        off = _OFF_FLAP if across == 2 else _OFF_EDGE
+        if across == 2 and beyond < 0.0 and side * (edge - self.handle[2, 3]) < _LOW:
+            off = _SILL
+        if abs(beyond) > off and beyond > -inside:
             self.origin[across] = edge
 
     def hang(
@@ -281,6 +289,24 @@ class ShutPart:
         faces = turned[on] * np.sign(turned[on, :1])
         ahead = np.cross(self.axis, np.array([1.0, 0.0, 0.0]))  # where X goes as it opens
         self._turn_back(float(np.median(np.arctan2(faces @ ahead, faces[:, 0]))))
+
+    def meet_panel(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    ) -> None:
+        """Have a door that stands open turn about where its panel ends, and stand as open as its panel does."""
+        if self.kind == "slide" or self.opening == 0.0 or np.abs(self.axis[1:]).max() < _SNAP:
+            return
+        stands = invert(self.back) @ self.handle
+        agree = _AGREE[self.sensed.confidence >= _RELIED_ON]
+        found = hinge_of_panel(points, normals, stands, self.origin, self.axis, agree)
+        if found is None:
+            return
+        hinge, way = found
+        shut = np.cross(np.array([1.0, 0.0, 0.0]), self.axis)  # from the hinge to the handle
+        opening = float(np.arctan2(way[0], way @ shut) % (2 * np.pi))
+        if abs(opening - self.opening) < _MISSWUNG:
+            self.origin = hinge
+            self._turn_back(opening - self.opening)
 
     def _turn_back(self, further: float) -> None:
         """Take it to be further open than was thought [rad]."""

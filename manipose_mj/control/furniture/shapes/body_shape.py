@@ -15,6 +15,12 @@ _CELL, _CELL_LEAST = 0.01, 3  # in which points are counted [m]; points
 # its front, of those that are exceeded in so many percent of the places.
 _THICK_CELL, _FEWEST_CELLS, _WHOLE, _MOST_OF = 0.02, 6, 0.6, 75
 
+_BIN, _SHARE, _FEWEST = (
+    0.005,
+    0.3,
+    60,
+)  # in which points are counted [m], their share of the fullest, and how many there are
+
 
 def ends_of(
     points: Float[np.ndarray, "n 3"],
@@ -44,6 +50,24 @@ def front_of(points: Float[np.ndarray, "n 3"]) -> float | None:
     extents = np.array([np.ptp(cells[cells[:, 0] == x, 1:], axis=0) for x in places])
     whole = (extents > _WHOLE * np.percentile(extents, _MOST_OF, axis=0)).all(axis=1)
     return float((places[whole].max() + 1) * _THICK_CELL) if whole.any() else None
+
+
+def foremost(facing: Float[np.ndarray, "n"], about: float, mistaken: float) -> float | None:
+    """The foremost of the places along X where much faces out of the front [m]; None where nothing does.
+
+    Args:
+      facing: Where along X points are that do [m].
+      about: Where the front is thought to be [m].
+      mistaken: How far it may be from there [m].
+    """
+    near = facing[np.abs(facing - about) < mistaken]
+    counts, edges = np.histogram(near, np.arange(about - mistaken, about + mistaken + _BIN, _BIN))
+    counts = np.convolve(counts, np.ones(2), mode="same")
+    many = np.flatnonzero(counts > max(_FEWEST, _SHARE * counts.max()))
+    if not len(many):
+        return None
+    place = edges[many[-1]]
+    return float(np.median(near[np.abs(near - place) < 2 * _BIN]))
 
 
 def body_slices(points: Float[np.ndarray, "n 3"], bounds: Float[np.ndarray, "2 3"]) -> Boxes:
