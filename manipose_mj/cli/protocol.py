@@ -42,8 +42,9 @@ def verify_protocol(
 ) -> int:
     """Replay the certificates of a protocol's starts: the baseline must solve each again.
 
-    Where one does not hold, as may be on another kind of processor, the start is tried by other samples of the planner, as
-    by certify. Such starts are named as they are found, on standard error, and at the end. Exits with 1 if none solves one.
+    Where one does not hold, as may be on another kind of processor, the start is tried by other samples of the planner,
+    twice as many as by certify. Such starts are named as they are found, on standard error, and at the end. Exits with
+    1 if none solves one.
 
     Args:
       version: Of the protocol.

@@ -18,12 +18,16 @@ from manipose_mj.tasks.core.start import NoStartError
 
 # Budgets of plans, each with a seed of its own: first what an evaluation has, at last three times as many.
 BUDGETS = (MAX_PLANS, MAX_PLANS, 3 * MAX_PLANS)
+_ROUNDS = (
+    2  # of them, where a certificate does not hold: a pile may lie otherwise on another processor
+)
 UNDRAWN = "start"  # the stage at which a start fails that cannot be drawn
 
 
-def attempts(seed: int) -> tuple[Certificate, ...]:
-    """What is tried in turn for an episode's seed: first what an evaluation does, then other samples."""
-    return tuple(Certificate((seed + i) % 2**32, plans) for i, plans in enumerate(BUDGETS))
+def attempts(seed: int, rounds: int = 1) -> tuple[Certificate, ...]:
+    """What is tried in turn for an episode's seed: first what an evaluation does, then other samples; `rounds` times as many."""
+    budgets = BUDGETS * rounds
+    return tuple(Certificate((seed + i) % 2**32, plans) for i, plans in enumerate(budgets))
 
 
 def chosen_starts(
@@ -79,7 +83,7 @@ def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate
 def _outcome(
     version: str, start: Key, certificate: Certificate | None, assets: tuple[str, ...] = ()
 ) -> tuple[Key, Certificate | str]:
-    """Play a start by a certificate, then by all that `certify` tries; what solves it, or why the last did not."""
+    """Play a start by a certificate, then by twice what `certify` tries; what solves it, or why the last did not."""
     # An unstable simulation is in its episode's result; dm_control would say it hundreds of times.
     logging.getLogger("absl").setLevel(logging.ERROR)
     task, number = start
@@ -88,7 +92,8 @@ def _outcome(
     config = EnvConfig(task, obs_mode="state", split="test", objects=objects)
     tried = attempts(frozen.seed)
     if certificate is not None:
-        tried = (certificate, *(attempt for attempt in tried if attempt != certificate))
+        others = attempts(frozen.seed, _ROUNDS)
+        tried = (certificate, *(attempt for attempt in others if attempt != certificate))
     reason = ""
     for attempt in tried:
         try:

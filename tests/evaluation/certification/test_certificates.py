@@ -112,6 +112,8 @@ def test_the_first_attempt_is_what_an_evaluation_plays():
     assert attempts(2**32 - 1)[0] == Certificate(2**32 - 1, MAX_PLANS)
     assert attempts(2**32 - 1)[1].planner_seed == 0
     assert attempts(0)[-1].plans > MAX_PLANS
+    assert attempts(0, 2)[:3] == attempts(0)
+    assert [each.planner_seed for each in attempts(0, 2)] == list(range(6))
 
 
 def test_every_start_of_v1_is_certified_and_draws_before_it_are_counted():
@@ -180,7 +182,7 @@ def test_where_a_certificate_does_not_hold_other_samples_are_tried(monkeypatch):
     assert search._outcome("v1", start, tried[0]) == (start, tried[-1])
     assert played == list(tried)
     assert search._outcome("v1", start, tried[-1]) == (start, tried[-1])
-    monkeypatch.setattr(search, "attempts", lambda seed: tried[:2])
+    monkeypatch.setattr(search, "attempts", lambda seed, rounds=1: tried[:2])
     assert search._outcome("v1", start, tried[1]) == (start, "grasp: slipped")
 
 
