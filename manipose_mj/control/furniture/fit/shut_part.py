@@ -44,6 +44,7 @@ _OFF_EDGE, _OFF_FLAP, _INSIDE, _INSIDE_FLAP = 0.04, 0.015, 0.10, 0.20
 _LOW, _SILL = 0.50, 0.09
 # How far from where an open panel shows its hinge an estimate may be to stay [m], by whether it is of this confidence.
 _AGREE, _RELIED_ON = {False: 0.025, True: 0.08}, 0.6
+_MISTURNED = 0.25  # how far its opening by its line may be from that by its normals [rad]
 _FLAT = 0.012  # how far points of a flap, below which a plinth may be, are from its plane [m]
 _LONG_BAR = 0.10  # half the length of a handle, from which on it is no knob's [m]
 # Of a handle that was not measured, half of its usual length; of any, a little more than it takes up [m].
@@ -293,8 +294,13 @@ class ShutPart:
     def meet_panel(
         self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
     ) -> None:
-        """Have a door that stands open turn about where its panel ends, and stand as open as its panel does."""
+        """Have a door that stands open turn about where its panel ends, and stand as open as its panel does.
+
+        Not where the panel was seen before anything was fitted, nor where its line and its normals tell different openings.
+        """
         if self.kind == "slide" or self.opening == 0.0 or np.abs(self.axis[1:]).max() < _SNAP:
+            return
+        if self.sensed.certain:
             return
         stands = invert(self.back) @ self.handle
         agree = _AGREE[self.sensed.confidence >= _RELIED_ON]
@@ -304,7 +310,7 @@ class ShutPart:
         hinge, way = found
         shut = np.cross(np.array([1.0, 0.0, 0.0]), self.axis)  # from the hinge to the handle
         opening = float(np.arctan2(way[0], way @ shut) % (2 * np.pi))
-        if abs(opening - self.opening) < _MISSWUNG:
+        if abs(opening - self.opening) < _MISTURNED:
             self.origin = hinge
             self._turn_back(opening - self.opening)
 
