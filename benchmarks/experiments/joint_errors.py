@@ -17,8 +17,8 @@ import numpy as np
 
 from manipose_mj import suite
 from manipose_mj.control.baseline import Baseline
-from manipose_mj.control.furniture.part_sensing import SensedFurniture, sense_parts
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture, sense_parts
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.perception import pose_sources
 from manipose_mj.control.perception.sensed_world import SensedWorld
 from manipose_mj.failures import StageFailure

@@ -273,21 +273,20 @@ def corrupted_clouds() -> Figure:
 
 
 def furniture() -> Figure:
-    """Shares of handles and joints found and right, on the catalogue and on PartNet-Mobility."""
+    """Shares of handles and joints found and right, by the network and once all points are fitted."""
     measures = ("found", "centre", "axes", "joint", "all")
     figure = new_figure(7.2, 3.2)
     axes = axes_of(figure)
-    for shift, row in enumerate(rows("furniture")):
+    for shift, row in enumerate(each for each in rows("furniture") if each["views"] == "3"):
         colour = TEAL if row["objects"] == "catalogue" else ORANGE
         x = np.arange(len(measures)) + 0.2 * (shift - 1.5)
-        label = f"{row['objects']}, {row['views']} view{'s' if row['views'] != '1' else ''}"
         axes.bar(
             x,
             [float(row[m]) for m in measures],
             width=0.18,
             color=colour,
-            alpha=1.0 if row["views"] == "1" else 0.6,
-            label=label,
+            alpha=0.6 if row["by"] == "network" else 1.0,
+            label=f"{row['objects']}, {row['by']}",
         )
     axes.set_xticks(range(len(measures)), measures)
     axes.set_ylim(0, 100)

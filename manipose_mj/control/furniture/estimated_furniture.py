@@ -18,9 +18,9 @@ from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, po
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
 from manipose_mj.control.furniture.opening_search import Hidden, as_held, found_opening, misfit
-from manipose_mj.control.furniture.part_sensing import PartSensor, SensedFurniture
 from manipose_mj.control.furniture.pulled_out import as_it_moved, pulled_out
-from manipose_mj.control.furniture.scene_cloud import (
+from manipose_mj.control.furniture.sensing.part_sensing import PartSensor, SensedFurniture
+from manipose_mj.control.furniture.sensing.scene_cloud import (
     SceneCloud,
     SceneViews,
     hidden_from,

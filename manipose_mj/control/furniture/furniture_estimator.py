@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, PRNGKeyArray
 
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.part_sensing import sensed_furniture
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.part_sensing import sensed_furniture
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, invert, transform

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float
 
 from manipose_mj.assets.asset import Cavity
 from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.seen_through import Past, widened
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import voxel_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import invert, transform

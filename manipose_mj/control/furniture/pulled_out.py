@@ -12,7 +12,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.fit.furniture_fit import cavity_behind
 from manipose_mj.control.furniture.other_kind import as_drawer
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import (
     ACROSS_FRONT,

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import foremost, front_of
 from manipose_mj.control.furniture.shapes.door_line import DoorLine, longest_line
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel

@@ -17,7 +17,7 @@ from dm_control import mjcf
 from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, GraspSet
-from manipose_mj.control.furniture.scene_cloud import SceneViews
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneViews
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.camera_rig import (
     FRONT_CAMERAS,

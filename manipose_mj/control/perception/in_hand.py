@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.furniture.scene_cloud import Sight, seen_past
+from manipose_mj.control.furniture.sensing.scene_cloud import Sight, seen_past
 from manipose_mj.control.perception.pose_sensing import SensedPose
 
 # By how much fingers close when they lose what they held: [m], and as a share of its width.

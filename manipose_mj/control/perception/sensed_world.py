@@ -11,8 +11,8 @@ from dm_control import composer, mjcf
 from jaxtyping import Float
 
 from manipose_mj.control.furniture.estimated_furniture import EstimatedFurniture
-from manipose_mj.control.furniture.part_sensing import PartSensor, sense_parts
-from manipose_mj.control.furniture.scene_cloud import SceneViews
+from manipose_mj.control.furniture.sensing.part_sensing import PartSensor, sense_parts
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneViews
 from manipose_mj.control.furniture.shapes.boxes import Boxes, no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel
 from manipose_mj.control.furniture.surroundings import surrounding_boxes

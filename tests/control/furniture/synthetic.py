@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.poses import compose, rotation_about, transform
 
 FRONT, HALF, HEIGHT, THICKNESS = 0.2, 0.3, 0.5, 0.02

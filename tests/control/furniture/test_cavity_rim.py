@@ -10,7 +10,7 @@ from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.cavity_rim import seen_rim, tallest_compartment
 from manipose_mj.control.furniture.opened_part import seen_open
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import SymmetryGroup, transform

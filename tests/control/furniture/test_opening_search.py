@@ -12,7 +12,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.opened_part import seen_open
 from manipose_mj.control.furniture.opening_search import as_held, found_opening, misfit
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import handle_label

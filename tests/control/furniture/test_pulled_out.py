@@ -11,7 +11,7 @@ from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.control.furniture.pulled_out import as_it_moved, pulled_out
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.poses import SymmetryGroup

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.scene_cloud import Sight, hidden_from, seen_past
 from manipose_mj.control.furniture.seen_through import widened
+from manipose_mj.control.furniture.sensing.scene_cloud import Sight, hidden_from, seen_past
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 
 HOLE = np.array([[-0.1, -0.10, 0.02], [0.2, 0.12, 0.28]])

@@ -10,7 +10,7 @@ import pytest
 from manipose_mj.assets.asset import MovingPart
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.part_sensing import SensedFurniture
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture
 from manipose_mj.control.furniture.shapes.boxes import no_boxes
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.swung_out import (

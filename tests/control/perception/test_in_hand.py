@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from manipose_mj.control.furniture.scene_cloud import Sight
+from manipose_mj.control.furniture.sensing.scene_cloud import Sight
 from manipose_mj.control.perception.in_hand import InHand, is_gone
 from manipose_mj.control.perception.pose_sensing import SensedPose
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics

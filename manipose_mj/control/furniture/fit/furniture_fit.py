@@ -20,8 +20,8 @@ from manipose_mj.control.furniture.fit.shut_part import (
     between_neighbours,
     panel_place,
 )
-from manipose_mj.control.furniture.part_sensing import SensedFurniture
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.body_shape import body_slices, ends_of
 from manipose_mj.control.furniture.shapes.furniture_model import FurnitureModel, PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import handle_boxes, handle_label

@@ -18,7 +18,7 @@ from manipose_mj.control.furniture.fit.door_hinge import (
     whole_front,
 )
 from manipose_mj.control.furniture.fit.object_frame import AJAR
-from manipose_mj.control.furniture.part_sensing import SensedPart
+from manipose_mj.control.furniture.sensing.part_sensing import SensedPart
 from manipose_mj.control.furniture.shapes.furniture_model import motion_of
 from manipose_mj.control.furniture.shapes.handle_shape import (
     ACROSS_FRONT,

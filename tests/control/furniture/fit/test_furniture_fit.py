@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.part_sensing import SensedFurniture, SensedPart
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture, SensedPart
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.control.furniture.shapes.furniture_model import PartModel
 from manipose_mj.control.furniture.shapes.handle_shape import ACROSS_FRONT, UP_FRONT, handle_label
 from manipose_mj.poses import compose, rotation_about, transform

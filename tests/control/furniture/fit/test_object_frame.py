@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.control.furniture.fit.object_frame import object_pose
-from manipose_mj.control.furniture.part_sensing import SensedFurniture
+from manipose_mj.control.furniture.sensing.part_sensing import SensedFurniture
 from tests.control.furniture.synthetic import HALF, HEIGHT, body, cloud, door, rectangle
 
 X, Y, Z = np.eye(3)

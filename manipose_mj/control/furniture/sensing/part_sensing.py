@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from manipose_mj.control.furniture.scene_cloud import SceneCloud
+from manipose_mj.control.furniture.sensing.scene_cloud import SceneCloud
 from manipose_mj.errors import InputError
 from manipose_mj.poses import invert, transform
 
