@@ -58,7 +58,7 @@ class OpenClose(FurnitureTask):
         """Put a simulation where an episode starts.
 
         Raises:
-          NoStartError: The part does not stay as it was drawn: the hand at home is in its way.
+          NoStartError: The part does not stay as it was drawn, or touches the arm at home: the arm is in its way.
         """
         super().write(physics, start)
         part, (now,) = self.part, self.pieces.opening(physics, self._piece)
@@ -67,6 +67,10 @@ class OpenClose(FurnitureTask):
         if abs(now - drawn) > _MOVED * (high - low):
             raise NoStartError(
                 f"{part.name} of {self.furniture.asset.name} moves from {drawn:.2f} to {now:.2f} before the episode starts"
+            )
+        if self.scene_state(physics).parts[part.name].touched:
+            raise NoStartError(
+                f"{part.name} of {self.furniture.asset.name}, at {now:.2f}, is in the way of the arm at home"
             )
 
     @property
