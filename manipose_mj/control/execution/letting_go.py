@@ -58,12 +58,29 @@ def let_go(
     for last in (False, True):
         estimate = executor.observe()
         planner = planner.within(estimate.scene)
-        line = retreat_from(planner, estimate, name, _OWN_PART if felt else None, close=close)
+        line = _way_back(planner, estimate, name, _OWN_PART if felt else None, close=close)
         yield from executor.follow(line)
         if last or not felt or _off(executor.joints(), line[-1]) < _HANGS:
             return
         yield from executor.relax()
         yield from executor.open_to(MAX_OPENING)
+
+
+def _way_back(
+    planner: MotionPlanner,
+    estimate: SceneEstimate,
+    name: str,
+    near: float | None,
+    *,
+    close: bool,
+) -> Float[np.ndarray, "t 7"]:
+    """As `retreat_from`, but a short way where there is no room for more, as between an oven and its open flap."""
+    try:
+        return retreat_from(planner, estimate, name, near, close=close)
+    except StageFailure:
+        if close:
+            raise
+        return retreat_from(planner, estimate, name, near, close=True)
 
 
 def _off(joints: Float[np.ndarray, "7"], target: Float[np.ndarray, "7"]) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.control.execution import letting_go
+from manipose_mj.failures import StageFailure
 from manipose_mj.mjcf.panda.kinematics import HOME
 
 AWAY = HOME + [0.0, -0.3, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -57,4 +58,20 @@ def test_a_hand_that_hangs_on_a_handle_opens_all_the_way(monkeypatch, needs, ope
     for _ in letting_go.let_go(hand, planner, "door"):
         pass
     assert hand.opened == opened
+    np.testing.assert_array_equal(hand.joints(), AWAY)
+
+
+def test_a_hand_without_room_for_more_backs_off_a_short_way(monkeypatch):
+    def short_only(*arguments, close):
+        if not close:
+            raise StageFailure("release", "no way to back off from door")
+        return np.stack([HOME, AWAY])
+
+    monkeypatch.setattr(letting_go, "opening_to_let_go", lambda *_: 0.02)
+    monkeypatch.setattr(letting_go, "retreat_from", short_only)
+    hand = Hand(0.01)
+    planner = SimpleNamespace()
+    planner.within = lambda scene: planner
+    for _ in letting_go.let_go(hand, planner, "door"):
+        pass
     np.testing.assert_array_equal(hand.joints(), AWAY)
