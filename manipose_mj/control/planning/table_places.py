@@ -30,6 +30,9 @@ _SETTLES = (
     0.02,
     np.deg2rad(15.0),
 )  # how far from a pose at rest what is asked for may seem to be [m, rad]
+_SHALLOW = np.cos(
+    np.deg2rad(30.0)
+)  # cosine between verticals from which on one rest tips into the other
 _SAME_REST = 0.995  # cosine between verticals from which on two rests are one
 
 
@@ -57,11 +60,26 @@ def rest_of(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> int | No
     return int(np.argmax(alike)) if alike and max(alike) > _SAME_REST else None
 
 
+def _is_shallow(obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]) -> bool:
+    """Whether the rest with this side down is so near to another that a drop of millimetres tips the object over.
+
+    Nobody knows that of a shape that is estimated: its rests are its kind's.
+    """
+    index = rest_of(obj, rotation)
+    if index is None or obj.uncertainty > 0:
+        return False
+    ups = np.stack([rest.rotation[2] for rest in obj.rests])
+    near = ups @ ups[index] > _SHALLOW
+    return int(near.sum()) > 1
+
+
 def poses_with_rotation(
     obj: ObjectEstimate, rotation: Float[np.ndarray, "3 3"]
 ) -> tuple[Float[np.ndarray, "4 4"], ...]:
     """`T_world_label` all over the table, turned as `rotation`, nearest to the object first."""
-    height = resting_height(obj, rotation) + DROP_HEIGHT
+    height = resting_height(obj, rotation)
+    if not _is_shallow(obj, rotation):
+        height += DROP_HEIGHT
     own = obj.label_pose[:2, 3]
     order = sorted(PLACES, key=lambda place: float(np.linalg.norm(np.array(place) - own)))
     return tuple(compose(rotation, np.array([x, y, height])) for x, y in order)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -125,17 +126,36 @@ def test_destinations_rest_on_the_table_and_meet_the_goal(scene):
     _, estimate = scene.with_mug(scene.lying)
     obj = estimate.objects["object"]
     goals = [resting_rotation(obj, rest, 0.7) for rest in obj.rests]
+    ups = np.stack([rest.rotation[2] for rest in obj.rests])
+    alone = np.sort(ups @ ups.T)[:, -2] < np.cos(np.radians(30))
+    drops = iter(np.where(alone, DROP_HEIGHT, 0.0))
     for rest, rotation in zip(obj.rests, goals, strict=True):
         expected = rest.height + float((rest.rotation @ obj.label.origin)[2])
         assert resting_height(obj, rotation) == pytest.approx(expected, abs=1e-9)
+        drop = next(drops)
         for pose in destinations(OrientationGoal("object", rotation), obj):
             np.testing.assert_allclose(pose[:3, :3], rotation)
-            assert pose[2, 3] == pytest.approx(expected + DROP_HEIGHT)
+            assert pose[2, 3] == pytest.approx(expected + drop)
     tilted = rotation_about(np.array([1.0, 0.0, 0.0]), 0.5) @ goals[0]
     half = np.abs(tilted[2]) @ obj.label.extents / 2
     assert resting_height(obj, tilted) == pytest.approx(half)
     pose = goals[0] @ np.eye(3)
     assert len(destinations(PoseGoal("object", compose(pose, UP)), obj)) == 1
+
+
+def test_what_tips_over_into_a_rest_nearby_is_set_down_without_a_drop(scene):
+    _, estimate = scene.with_mug(scene.lying)
+    obj = estimate.objects["object"]
+    (rest, *_), rotation = obj.rests, resting_rotation(obj, obj.rests[0], 0.7)
+    for angle, drop in ((0.4, 0.0), (0.7, DROP_HEIGHT)):
+        turn = rotation_about(np.array([1.0, 0.0, 0.0]), angle)
+        tipped = replace(rest, rotation=turn @ rest.rotation)
+        own = replace(obj, rests=(rest, tipped))
+        (pose, *_) = poses_with_rotation(own, rotation)
+        assert pose[2, 3] - resting_height(own, rotation) == pytest.approx(drop, abs=1e-9)
+    unsure = replace(obj, rests=(rest, rest), uncertainty=0.01)
+    (pose, *_) = poses_with_rotation(unsure, rotation)
+    assert pose[2, 3] - resting_height(unsure, rotation) == pytest.approx(DROP_HEIGHT)
 
 
 def test_what_is_nearest_in_hand_keeps_its_side_and_its_turn(scene):
