@@ -297,10 +297,10 @@ def test_a_part_that_the_hand_at_home_pushes_shut_is_drawn_again():
 def test_a_part_that_the_arm_at_home_is_in_is_drawn_again():
     env = _load("close_microwave")
     task, physics = env.task, env.physics
-    placed = task.start.furniture[0]
+    start, placed = task.start, task.start.furniture[0]
     # The middle of the open door to where the hand is.
     door = physics.bind(task.furniture.mjcf_model.find("body", task.part.name)).xipos
     there = replace(placed, position=placed.position + task.robot.tcp_pose(physics)[:3, 3] - door)
     with pytest.raises(NoStartError, match="door of microwave_"):
-        task.write(physics, replace(task.start, furniture=(there,)))
-    task.write(physics, task.start)
+        task.write(physics, replace(start, furniture=(there,)))
+    task.write(physics, start)
