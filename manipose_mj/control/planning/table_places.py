@@ -30,9 +30,8 @@ _SETTLES = (
     0.02,
     np.deg2rad(15.0),
 )  # how far from a pose at rest what is asked for may seem to be [m, rad]
-_SHALLOW = np.cos(
-    np.deg2rad(30.0)
-)  # cosine between verticals from which on one rest tips into the other
+# Cosine between verticals from which on one rest tips into the other.
+_SHALLOW = np.cos(np.deg2rad(30.0))
 _SAME_REST = 0.995  # cosine between verticals from which on two rests are one
 
 
