@@ -19,7 +19,7 @@ CAMERA = "overview"
 STILLS = 6
 STILL_SIZE = (270, 360)  # height and width in pixels
 LAST_S = 1.5  # how long an animation shows how the episode ended
-# Pixels of the shadow map's side: more do not show at these sizes, and take half of the time where GL is software.
+# Pixels of the shadow map's side: more do not show at these sizes, and take 40 % of the time where GL is software.
 _SHADOW_MAP = 2048
 
 
