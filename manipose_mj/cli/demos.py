@@ -41,7 +41,7 @@ def record_demos(
       episodes: Successes per task.
       seed: Base seed; each attempt derives its own from it, as episodes of manipose evaluate do.
       jobs: Attempts at the same time, one core each; recordings do not depend on it.
-      resume: Go on after an interruption.
+      resume: Go on after an interruption, or with more episodes than are there.
       failures: Keep failed attempts too, labelled with the stage that failed.
       objects: What to draw from instead of all built-in objects for training: names of built-in ones, asset
         folders, or folders of asset folders.
@@ -100,7 +100,7 @@ def replay_demos(
       obs_mode: Observations to add, joined by +, such as rgb+pointcloud.
       control_mode: To convert the actions into.
       out: Folder for the new files; those that do not succeed any more are left out.
-      resume: Leave out tasks whose new files are there already, after an interruption.
+      resume: Leave out what is in new files already: whole tasks, or the first episodes of a set that has grown.
       jobs: Episodes at the same time, one core each.
     """
     prepare_workers(jobs)
@@ -120,12 +120,14 @@ def replay_demos(
     console, notes = output.standard_output(), output.standard_error()
     worst = 0
     for demos in find_sets(data):
-        if resume and (before := replayed_before(demos, config)) is not None:
+        before = replayed_before(demos, config) if resume else None
+        if before is not None:
             console.print(
                 f"{demos.task}: {len(before.episodes)} are there already: {before.path}",
                 soft_wrap=True,
             )
-            continue
+            if before.replayed == len(demos.episodes):
+                continue
         if changed := differing_versions(demos):
             notes.print(f"{demos.task}: recorded with other versions: {', '.join(changed)}")
         with output.Progress(f"replays of {demos.task}") as progress:
@@ -133,7 +135,7 @@ def replay_demos(
             def show(done: int, total: int) -> None:
                 progress.update(done, total, "replayed")
 
-            results = replay(demos, config, on_progress=show)
+            results = replay(demos, config, before, on_progress=show)
         same = sum(each.identical for each in results)
         wins = sum(each.success for each in results)
         repeats = "" if out is not None else f"{same} bit for bit, "

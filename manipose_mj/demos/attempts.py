@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ from manipose_mj.demos.layout import (
     RECORDED_MODE,
     DemoArrays,
     DemoEpisode,
+    DemoSet,
+    reading,
     write_episode,
     writing,
 )
@@ -109,14 +111,30 @@ def attempt(config: EnvConfig, seed: int, number: int, folder: Path, *, failures
         with writing(attempt_file(folder, number).with_suffix(".h5")) as file:
             write_episode(file, number, arrays)
     episode = _described(result, number, instruction(environment.task), tape.digest)
-    text = json.dumps(asdict(episode), allow_nan=False)
-    write_atomically(attempt_file(folder, number), text.encode())
+    _write_outcome(episode, folder)
 
 
 def copy_arrays(folder: Path, number: int, into: h5py.File, episode_id: int) -> None:
     """Add an attempt's arrays to a file, as those of an episode."""
     with h5py.File(attempt_file(folder, number).with_suffix(".h5"), "r") as file:
         file.copy(f"traj_{number}", into, name=f"traj_{episode_id}")
+
+
+def split_off(demos: DemoSet, episode: DemoEpisode, folder: Path, number: int) -> None:
+    """Make an episode of a set into the files that its attempt left, where they are not there already."""
+    if attempt_file(folder, number).exists():
+        return
+    with (
+        reading(demos.path) as file,
+        writing(attempt_file(folder, number).with_suffix(".h5")) as own,
+    ):
+        file.copy(f"traj_{episode.episode_id}", own, name=f"traj_{number}")
+    _write_outcome(replace(episode, episode_id=number), folder)
+
+
+def _write_outcome(episode: DemoEpisode, folder: Path) -> None:
+    text = json.dumps(asdict(episode), allow_nan=False)
+    write_atomically(attempt_file(folder, episode.episode_id), text.encode())
 
 
 def _described(result: EpisodeResult, number: int, sentence: str, state_sha256: str) -> DemoEpisode:

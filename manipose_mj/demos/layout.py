@@ -91,6 +91,7 @@ class DemoSet:
       versions: Of the packages that can change a replay.
       protocol: Version and sha256 of the protocol whose seeds it must not hold.
       episodes: In the order of their ids.
+      replayed: How many episodes of a recording it is a replay of; None: it is the recording.
     """
 
     path: Path
@@ -99,6 +100,7 @@ class DemoSet:
     versions: dict[str, str]
     protocol: dict[str, str]
     episodes: tuple[DemoEpisode, ...]
+    replayed: int | None = None
 
     @property
     def document(self) -> dict[str, Any]:
@@ -114,6 +116,7 @@ class DemoSet:
             "source_desc": "the baseline of ManiPose-MJ with true poses",
             "versions": self.versions,
             "protocol": self.protocol,
+            **({} if self.replayed is None else {"replayed": self.replayed}),
             "episodes": [asdict(episode) for episode in self.episodes],
         }
 
@@ -241,6 +244,7 @@ def read_set(path: Path) -> DemoSet:
             document["versions"],
             document["protocol"],
             episodes,
+            document.get("replayed"),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())

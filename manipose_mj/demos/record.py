@@ -92,7 +92,6 @@ class RecordConfig:
         """What two runs must share for their attempts to belong together."""
         return {
             "task": self.task,
-            "episodes": self.episodes,
             "seed": self.seed,
             "failures": self.failures,
             "objects": self.stated_objects,
@@ -132,17 +131,23 @@ def record(
 
     Args:
       config: What to record.
-      resume: Go on with the attempts that the folder holds.
+      resume: Go on with what the folder holds: attempts, or demonstrations, to which those that lack are added.
       on_progress: Called with the number of successes so far and that wanted.
 
     Raises:
       InputError: The folder holds demonstrations and `resume` is False, or others; or the baseline fails too often.
     """
-    if config.path.exists():
-        return _finished(config, resume)
-    _claim(config, resume)
     seeds = config.seeds()
     planned: list[tuple[int, int]] = []
+    if config.path.exists():
+        demos = _recorded(config, resume)
+        if sum(each.success for each in demos.episodes) >= config.episodes:
+            shutil.rmtree(config.parts, ignore_errors=True)
+            return demos
+        _claim(config, resume)
+        planned = _taken_apart(config, demos, seeds)
+    else:
+        _claim(config, resume)
     while True:
         ended = [_outcome(config, number) for number, _ in planned]
         wins = sum(each.success for each in ended)
@@ -161,23 +166,50 @@ def record(
     return _assembled(config, ended)
 
 
-def _finished(config: RecordConfig, resume: bool) -> DemoSet:
-    """The set that is there already."""
+def _recorded(config: RecordConfig, resume: bool) -> DemoSet:
+    """The set that is there already, if it is the beginning of what is asked for."""
     demos = read_set(config.path)
     wins = sum(each.success for each in demos.episodes)
-    if not resume or wins < config.episodes:
+    if not resume:
         raise InputError(
-            f"{config.path}: holds {wins} successes; choose another --out, and another --seed to "
-            "record others"
+            f"{config.path}: holds {wins} successes; add --resume for more, or choose another --out"
         )
     if demos.env_kwargs["objects"] != config.stated_objects:
         raise InputError(f"{config.path}: its objects are others; choose another --out")
     attempts = islice(config.seeds(), (_PATIENCE + 1) * (wins + 2))
-    planned = (seed for _, seed in attempts)
+    planned = {seed: number for number, seed in attempts}
     if not all(each.episode_seed in planned for each in demos.episodes):
         raise InputError(f"{config.path}: was recorded with another --seed; choose another --out")
-    shutil.rmtree(config.parts, ignore_errors=True)
+    if wins >= config.episodes:
+        return demos
+    for name, value in (("versions", demos.versions), ("protocol", demos.protocol)):
+        if value != config.identity[name]:
+            raise InputError(
+                f"{config.path}: was recorded with {name} {value}, this run has "
+                f"{config.identity[name]}; choose another --out for more"
+            )
+    if not config.failures and wins < len(demos.episodes):
+        raise InputError(f"{config.path}: holds failures too; add --failures for more of both")
+    last = max((planned[each.episode_seed] for each in demos.episodes), default=-1)
+    if config.failures and len(demos.episodes) < sum(n <= last for n in planned.values()):
+        raise InputError(f"{config.path}: lacks its failures; leave out --failures for more")
     return demos
+
+
+def _taken_apart(
+    config: RecordConfig, demos: DemoSet, seeds: Iterator[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    """The attempts whose demonstrations are there, made into their files again; `seeds` goes on after the last."""
+    from manipose_mj.demos.attempts import split_off
+
+    by_seed = {each.episode_seed: each for each in demos.episodes}
+    taken: list[tuple[int, int]] = []
+    while len(taken) < len(by_seed):
+        number, seed = next(seeds)
+        if seed in by_seed:
+            split_off(demos, by_seed[seed], config.parts, number)
+            taken.append((number, seed))
+    return taken
 
 
 def _claim(config: RecordConfig, resume: bool) -> None:
@@ -270,6 +302,8 @@ def _assembled(config: RecordConfig, ended: list[DemoEpisode]) -> DemoSet:
         identity["protocol"],
         episodes,
     )
+    # What a set held that was there before is among the attempts.
+    config.path.unlink(missing_ok=True)
     # The description first: without arrays it is none, and the next run writes both again.
     write_description(demos)
     with writing(config.path) as file:

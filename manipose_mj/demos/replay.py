@@ -20,6 +20,7 @@ from manipose_mj.demos.layout import (
     current_versions,
     read_actions,
     read_set,
+    reading,
     task_folder,
     trajectory_name,
     write_description,
@@ -115,15 +116,17 @@ def _ignore(done: int, total: int) -> None: ...
 def replay(
     demos: DemoSet,
     config: ReplayConfig,
+    before: DemoSet | None = None,
     *,
     on_progress: Callable[[int, int], None] = _ignore,
 ) -> list[Replayed]:
-    """Replay all episodes of a set; where there is a place for it, write those that succeed into a new one.
+    """Replay the episodes of a set; where there is a place for it, write those that succeed into a new one.
 
     Args:
       demos: Recorded in `pd_joint_pos`.
       config: How.
-      on_progress: Called with the number of episodes that have ended, and of all.
+      before: An earlier replay of the set, as `replayed_before` gives it; what it lacks is added to it.
+      on_progress: Called with the number of episodes that have ended, and of those to be replayed.
 
     Raises:
       InputError: Modes that do not exist, demonstrations of another control mode, or a file there already.
@@ -134,12 +137,14 @@ def replay(
     path = config.path(demos)
     if path is None:
         return _all(demos, config, None, on_progress)
-    if path.exists():
+    if path.exists() and before is None:
         raise InputError(f"{path}: is there already; add --resume or choose another --out")
     clear_staging(path.parent)
     with staging(path.parent / "replay") as parts:
-        results = _all(demos, config, parts, on_progress)
+        first = 0 if before is None else before.replayed
+        results = _all(replace(demos, episodes=demos.episodes[first:]), config, parts, on_progress)
         kept = [each.now for each in results if each.now is not None]
+        known = () if before is None else before.episodes
         env_kwargs = {
             **demos.env_kwargs,
             "obs_mode": config.obs_mode or "none",
@@ -150,35 +155,50 @@ def replay(
             path=path,
             env_kwargs=env_kwargs,
             versions=current_versions(),
-            episodes=tuple(kept),
+            episodes=(*known, *kept),
+            replayed=len(demos.episodes),
         )
-        write_description(new)
-        _join(parts, path, kept)
+        # Of what is not described nothing is read, and arrays alone are no set.
+        if before is None:
+            write_description(new)
+            _join(parts, path, kept)
+        else:
+            _join(parts, path, kept, before)
+            write_description(new)
     return results
 
 
 def replayed_before(demos: DemoSet, config: ReplayConfig) -> DemoSet | None:
-    """What an earlier replay of a set left, whole as it is always; None where there was none.
+    """What an earlier replay of a set left, whole as far as the set went then; None where there was none.
 
     Raises:
-      InputError: It is broken, or of another set.
+      InputError: It is broken, or of another set, or its episodes were replayed with other versions than these.
     """
     path = config.path(demos)
     if path is None or not path.exists():
         return None
     before = read_set(path)
-    seeds = {each.episode_seed for each in demos.episodes}
+    seeds = {each.episode_id: each.episode_seed for each in demos.episodes}
     same = before.env_kwargs["objects"] == demos.env_kwargs["objects"]
-    if not same or not all(each.episode_seed in seeds for each in before.episodes):
+    ours = all(seeds.get(each.episode_id) == each.episode_seed for each in before.episodes)
+    if not same or not ours or before.replayed is None:
         raise InputError(f"{path}: is of other demonstrations; choose another --out")
+    if before.replayed < len(demos.episodes) and before.versions != current_versions():
+        raise InputError(f"{path}: was made with other versions; choose another --out for more")
     return before
 
 
-def _join(parts: Path, path: Path, episodes: Sequence[DemoEpisode]) -> None:
-    """One file of all parts."""
+def _join(
+    parts: Path, path: Path, episodes: Sequence[DemoEpisode], before: DemoSet | None = None
+) -> None:
+    """One file of all parts, after the episodes of a set that was there before."""
     import h5py
 
     with writing(path) as file:
+        if before is not None:
+            with reading(before.path) as old:
+                for episode in before.episodes:
+                    old.copy(f"traj_{episode.episode_id}", file)
         for episode in episodes:
             name = f"traj_{episode.episode_id}"
             with h5py.File(parts / f"{name}.h5", "r") as part:

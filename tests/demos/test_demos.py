@@ -193,12 +193,53 @@ def test_the_first_successes_are_kept_whatever_was_interrupted(tmp_path, monkeyp
     again = record(config(tmp_path / "cut", episodes=5), resume=True)
     assert calls == [3, 4, 5, 6] and again.episodes == whole.episodes
     assert record(config(tmp_path / "cut", episodes=5), resume=True).episodes == whole.episodes
-    with pytest.raises(InputError, match="holds 5 successes"):
-        record(config(tmp_path / "cut", episodes=6), resume=True)
+    with pytest.raises(InputError, match="holds 5 successes; add --resume for more"):
+        record(config(tmp_path / "cut", episodes=6))
     with pytest.raises(InputError, match="recorded with another --seed"):
         record(config(tmp_path / "cut", episodes=5, seed=2), resume=True)
     with pytest.raises(InputError, match="its objects are others"):
         record(config(tmp_path / "cut", episodes=5, objects=("mug_000",)), resume=True)
+
+
+def test_a_set_is_extended(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    whole = record(config(tmp_path / "whole", episodes=5))
+    record(config(tmp_path / "grown", episodes=2))
+    calls = []
+
+    def counted(config, number, seed):
+        calls.append(number)
+        if number == 6 and calls.count(6) == 1:
+            raise KeyboardInterrupt
+        return _attempting(config, number, seed)
+
+    monkeypatch.setattr(recording, "_attempt", counted)
+    asked = config(tmp_path / "grown", episodes=5)
+    with pytest.raises(KeyboardInterrupt):
+        record(asked, resume=True)
+    assert len(read_set(asked.path).episodes) == 2  # nothing is lost
+    assert record(asked, resume=True).episodes == whole.episodes
+    assert calls == [3, 4, 5, 6, 6] and not asked.parts.exists()
+    assert asked.path.read_bytes() == whole.path.read_bytes()
+    assert read_set(asked.path).document == whole.document
+    for each in whole.episodes:
+        assert (read_actions(read_set(asked.path), each) == each.elapsed_steps - 1).all()
+
+
+def test_a_set_is_extended_by_what_it_holds_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    record(config(tmp_path / "successes", episodes=2))
+    record(config(tmp_path / "both", episodes=2, failures=True))
+    more = {"episodes": 3}
+    with pytest.raises(InputError, match="lacks its failures; leave out --failures"):
+        record(config(tmp_path / "successes", failures=True, **more), resume=True)
+    with pytest.raises(InputError, match="holds failures too; add --failures"):
+        record(config(tmp_path / "both", **more), resume=True)
+    grown = record(config(tmp_path / "both", failures=True, **more), resume=True)
+    assert [each.success for each in grown.episodes] == [True, False, True, True]
+    monkeypatch.setattr(recording, "current_versions", lambda: {"mujoco": "0.1"})
+    with pytest.raises(InputError, match="this run has {'mujoco': '0.1'}; choose another --out"):
+        record(config(tmp_path / "successes", **more), resume=True)
 
 
 def test_recordings_name_folders_of_objects_by_their_whole_path(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.cli.main import main
-from manipose_mj.demos.layout import current_versions, find_sets
+from manipose_mj.demos.layout import current_versions, find_sets, read_set, write_description
 from manipose_mj.demos.observation_tape import ObservationTape
 from manipose_mj.demos.record import record
 from manipose_mj.demos.replay import (
@@ -52,8 +52,11 @@ def test_a_resumed_replay_leaves_out_what_is_whole(copied, demos, tmp_path, caps
     assert replayed_before(demos, asked) is None
     path = asked.path(demos)
     path.parent.mkdir(parents=True)
-    for kind in (".h5", ".json"):
-        shutil.copy(copied.with_suffix(kind), path.with_suffix(kind))
+    shutil.copy(copied, path)
+    write_description(replace(read_set(copied), path=path))
+    with pytest.raises(InputError, match="is of other demonstrations"):
+        replayed_before(demos, asked)
+    write_description(replace(read_set(copied), path=path, replayed=2))
     words = ["demos", "replay", str(demos.path), "--control-mode", "pd_ee_pose", "--jobs", "1"]
     before = path.read_bytes()
     assert main([*words, "--out", str(out)]) == 2
@@ -78,6 +81,14 @@ def test_a_replay_adds_observations_and_converts(demos, tmp_path):
         for name, width in (("agent_pos", 17), ("environment_state", 20)):
             assert group[f"obs/{name}"].shape == (episode.elapsed_steps + 1, width)
         assert (np.diff(group["obs/agent_pos"][:, 8:11], axis=0) != 0).any()
+    grown = replace(asked, out=tmp_path / "grown")
+    replay(replace(demos, episodes=demos.episodes[:1]), grown)
+    before = replayed_before(demos, grown)
+    assert before is not None and before.replayed == 1
+    assert replay(demos, grown, before) == results[1:]
+    after = read_set(before.path)
+    assert after.document == new.document and after.replayed == 2
+    assert after.path.read_bytes() == new.path.read_bytes()
     with pytest.raises(InputError, match="is there already"):
         replay(demos, asked)
     with pytest.raises(InputError, match="is a replay already"):
