@@ -1,11 +1,13 @@
-"""Importing modules that users name."""
+"""Importing modules that users name, and the arguments of what is in them."""
 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import sys
 from types import ModuleType
+from typing import Any
 
 from manipose_mj.errors import InputError
 
@@ -31,3 +33,28 @@ def import_user_module(name: str, said_by: str) -> ModuleType:
     except Exception as error:  # whatever a stranger's code raises
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"{said_by}: cannot import {name} ({reason[:300]})") from error
+
+
+def factory_arguments(text: str | None, option: str) -> dict[str, Any]:
+    """The keyword arguments of a factory.
+
+    Args:
+      text: A JSON object; None: no arguments.
+      option: Of the command line that gave it, which opens the message.
+
+    Raises:
+      InputError: It is none, or holds a number that is not finite.
+    """
+    if text is None:
+        return {}
+    try:
+        arguments = json.loads(text, parse_constant=_refuse)
+    except ValueError as error:
+        raise InputError(f"{option} {text}: no JSON ({error})") from None
+    if not isinstance(arguments, dict):
+        raise InputError(f'{option} {text}: expected a JSON object, such as {{"path": "a.pt"}}')
+    return arguments
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no finite number")

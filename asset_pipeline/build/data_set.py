@@ -16,7 +16,7 @@ from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
 from asset_pipeline.build.relabel import OVERRIDE, relabelled, write_measured
 from asset_pipeline.build.replaceable import PLACE, check_origin, place
-from asset_pipeline.build.rigid import finish_rigid
+from asset_pipeline.build.rigid import box_center, finish_rigid
 from asset_pipeline.build.workers.limited_call import LimitError, Limits, limited_call
 from asset_pipeline.geometry.convexify import ConvexSettings, convexify
 from asset_pipeline.geometry.mass import shell_mass_properties, solid_mass_properties
@@ -216,7 +216,8 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
             label_quality=draft.label_quality,
         )
     if override is not None:
-        write_measured(folder, measured)
+        centred = replace(measured.label, center=box_center(body, measured.label))
+        write_measured(folder, replace(measured, label=centred))
     return asset
 
 

@@ -184,20 +184,23 @@ def _motion(up: Float[np.ndarray, "3"], config: TrialConfig) -> Float[np.ndarray
 
 
 def _model(path: Path, gripper: ParallelJaw, timestep: float) -> mujoco.MjModel:
-    """The asset's own model with the hand beside it; the object's joint comes first."""
+    """The asset's own model with the hand beside it; the object's joint comes first.
+
+    No asset has names with a `/`.
+    """
     spec = mujoco.MjSpec.from_file(str(path))
     set_physics(spec.option, timestep)
     spec.option.tolerance = _TOLERANCE
-    hand = spec.worldbody.add_body(name="hand", gravcomp=1)
+    hand = spec.worldbody.add_body(name="trial/hand", gravcomp=1)
     slide = mujoco.mjtJoint.mjJNT_SLIDE
     for axis, direction in zip("xyz", np.eye(3), strict=True):
-        hand.add_joint(name=f"hand_{axis}", type=slide, axis=direction)
+        hand.add_joint(name=f"trial/hand_{axis}", type=slide, axis=direction)
     for low, high in np.array(gripper.hand):
         _add_box(hand, low, high, mass=0.3)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        finger = hand.add_body(name=side, gravcomp=1)
+        finger = hand.add_body(name=f"trial/{side}", gravcomp=1)
         finger.add_joint(
-            name=f"finger_{side}",
+            name=f"trial/finger_{side}",
             type=slide,
             axis=[0, sign, 0],
             range=[0, gripper.max_opening / 2],
@@ -210,17 +213,17 @@ def _model(path: Path, gripper: ParallelJaw, timestep: float) -> mujoco.MjModel:
             _add_box(finger, low, high, mass=0.02)
     fingers = spec.add_equality(
         type=mujoco.mjtEq.mjEQ_JOINT,
-        name1="finger_left",
-        name2="finger_right",
+        name1="trial/finger_left",
+        name2="trial/finger_right",
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
     )
     fingers.data[:2] = (0.0, 1.0)
     fingers.solref = ROBOT_SOLREF
     for axis in "xyz":
-        servo = spec.add_actuator(target=f"hand_{axis}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo = spec.add_actuator(target=f"trial/hand_{axis}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=40000.0, dampratio=1.0)
     for side in ("left", "right"):
-        servo = spec.add_actuator(target=f"finger_{side}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo = spec.add_actuator(target=f"trial/finger_{side}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(
             kp=2 * GRIPPER_STIFFNESS
         )  # towards shut; a finger has half the opening

@@ -274,4 +274,5 @@ def _name(file: Path) -> str:
 
 def _spelt(text: str) -> str:
     """With letters, digits and `_.-` only: it becomes a folder's name, and a name in MJCF."""
-    return re.sub(r"[^\w.-]+", "_", text).strip("._") or "object"
+    name = re.sub(r"[^\w.-]+", "_", text).strip("._") or "object"
+    return "world_object" if name == "world" else name  # MuJoCo's own body has that name

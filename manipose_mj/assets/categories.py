@@ -166,6 +166,11 @@ def find(name: str) -> tuple[str, int]:
     return _by_name()[name]
 
 
+def is_known(name: str) -> bool:
+    """Whether it is a built-in object's; those that `manipose assets build --beyond` makes are none."""
+    return name in _by_name()
+
+
 def entries() -> Iterator[tuple[str, tuple[str, int]]]:
     """The name, and the category and index, of every built-in object."""
     for row in CATALOGUE.values():

@@ -92,7 +92,7 @@ def in_folder(directory: Path) -> list[Entry]:
 def entry_of(asset: Asset) -> Entry:
     """The row of a built asset."""
     split = None
-    if asset.provenance.source == BUILT_IN:
+    if asset.provenance.source == BUILT_IN and categories.is_known(asset.name):
         category, index = categories.find(asset.name)
         split = categories.CATALOGUE[category].split(index)
     return Entry(

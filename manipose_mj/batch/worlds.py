@@ -148,7 +148,7 @@ class Worlds:
           state: Of all worlds.
           action: Of each.
           hold: Control steps for which the servos go where the action sent them, as in evaluations of policies with
-            fewer actions a second. The reward is the last one's.
+            fewer actions a second; no longer than to the horizon. The reward is the last one's.
 
         Raises:
           InputError: Actions have another shape, or `hold` is no positive whole number.
@@ -177,8 +177,10 @@ class Worlds:
           key: For the policy.
 
         Raises:
-          InputError: A policy is given without `steps`, or actions have another shape.
+          InputError: A policy is given without `steps`, there are fewer actions, or they have another shape.
         """
+        if steps is not None and steps < 0:
+            raise InputError(f"steps is {steps}; expected at least 0")
         if callable(policy):
             if steps is None:
                 raise InputError("a rollout of a policy needs the number of steps")
@@ -198,6 +200,8 @@ class Worlds:
 
         recorded = jnp.asarray(policy)
         self._check_shape(recorded.shape[1:])
+        if steps is not None and steps > len(recorded):
+            raise InputError(f"steps is {steps}; the recording has {len(recorded)} actions")
         # Nobody looks before the last step.
         blind = _Unseen(_without_observations(state), state.measurement, state.row)
         last, seen = jax.lax.scan(step, blind, recorded[:steps])
@@ -232,7 +236,10 @@ class Worlds:
                     f"{path}: its {name} differ from these worlds'; make them with the same arguments"
                 )
         shape = jax.eval_shape(self._begin, jnp.zeros(self.count, jnp.int32))
-        leaves = [jnp.asarray(saved[f"leaf_{i}"]) for i in range(len(jax.tree.leaves(shape)))]
+        names = [f"leaf_{i}" for i in range(len(jax.tree.leaves(shape)))]
+        if not saved.keys() >= {*names}:
+            raise InputError(f"{path}: no state of worlds can be read from it (parts are missing)")
+        leaves = [jnp.asarray(saved[name]) for name in names]
         return jax.tree.unflatten(jax.tree.structure(shape), leaves)
 
     def close(self) -> None:
@@ -307,7 +314,8 @@ class Worlds:
 
             def held(state: State, _: None) -> tuple[State, None]:
                 commands, targets = self._controller.hold(state.commands, rows)
-                return self._advanced(state._replace(commands=commands), targets), None
+                after = self._advanced(state._replace(commands=commands), targets)
+                return _choose(state.count >= layout.horizon, state, after), None
 
             going_on, _ = jax.lax.scan(held, going_on, length=hold - 1)
         diverged = going_on.terminated

@@ -76,12 +76,14 @@ def read_data(folder: Path) -> BopData:
       InputError: A file is missing or cannot be read, or an image shows an object more than once.
     """
     targets = read_json(folder / TARGETS_FILE)
-    width = _field(read_json(folder / "camera.json"), "width", folder / "camera.json")
+    if not isinstance(targets, list):
+        raise InputError(f"{folder / TARGETS_FILE}: expected a list of targets")
+    width = _count(read_json(folder / "camera.json"), "width", folder / "camera.json")
     scenes: dict[int, tuple[dict[str, Any], dict[str, Any]]] = {}
     found = []
     for entry in targets:
         where = folder / TARGETS_FILE
-        scene, image, number = (_field(entry, k, where) for k in ("scene_id", "im_id", "obj_id"))
+        scene, image, number = (_count(entry, k, where) for k in ("scene_id", "im_id", "obj_id"))
         if _field(entry, "inst_count", where) != 1:
             raise InputError(f"{where}: several instances of object {number} in image {image}")
         if scene not in scenes:
@@ -92,16 +94,17 @@ def read_data(folder: Path) -> BopData:
             )
         poses, cameras = scenes[scene]
         where = folder / "test" / f"{scene:06d}" / "scene_gt.json"
-        own = [p for p in _field(poses, str(image), where) if p.get("obj_id") == number]
+        shown = _field(poses, str(image), where)
+        own = [p for p in shown if isinstance(p, dict) and p.get("obj_id") == number]
         if len(own) != 1:
             raise InputError(f"{where}: image {image} has object {number} {len(own)} times")
         try:
             rotation = np.array(own[0]["cam_R_m2c"], float).reshape(3, 3)
             truth = compose(rotation, np.array(own[0]["cam_t_m2c"], float).reshape(3) / 1000)
             matrix = np.array(cameras[str(image)]["cam_K"], float).reshape(3, 3)
-        except (KeyError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"{where}: image {image} cannot be read ({error!r})") from None
-        found.append(Target(scene, image, number, truth, matrix, int(width)))
+        found.append(Target(scene, image, number, truth, matrix, width))
     if not found:
         raise InputError(f"{folder / TARGETS_FILE}: no targets")
     return BopData(_models(folder, {target.model for target in found}), tuple(found))
@@ -141,7 +144,7 @@ def _models(folder: Path, numbers: set[int]) -> dict[int, Model]:
                 category=own.get("category", ""),
                 object_type=own.get("type", ""),
             )
-        except (OSError, KeyError, ValueError) as error:
+        except (OSError, LookupError, TypeError, ValueError) as error:
             raise InputError(f"{place}: model {number} cannot be read ({error!r})") from None
     return models
 
@@ -157,3 +160,10 @@ def _field(entry: Any, name: str, path: Path) -> Any:
     if not isinstance(entry, dict) or name not in entry:
         raise InputError(f"{path}: {name!r} is missing")
     return entry[name]
+
+
+def _count(entry: Any, name: str, path: Path) -> int:
+    value = _field(entry, name, path)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise InputError(f"{path}: {name} is {value!r}; expected a whole number")
+    return value

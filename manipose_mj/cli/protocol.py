@@ -63,6 +63,8 @@ def verify_protocol(
     from manipose_mj.evaluation.protocol.own_assets import find_assets
 
     protocol = load(version)
+    if certificates is not None and not certificates.is_file():
+        raise InputError(f"{certificates}: no such file of certificates")
     known = load_certificates(protocol, certificates)
     starts = chosen_starts(protocol, tasks, episodes)
     find_assets(version, {task for task, _ in starts}, assets)

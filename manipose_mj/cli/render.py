@@ -40,7 +40,8 @@ def render(
     check_names((task,), objects)
     from PIL import Image
 
-    if out.suffix.lower() not in Image.registered_extensions():
+    formats = Image.registered_extensions()
+    if formats.get(out.suffix.lower()) not in Image.SAVE:
         raise InputError(f"{out}: no picture format has this ending; try .png")
     from manipose_mj.console import output
     from manipose_mj.evaluation.episode import start_state

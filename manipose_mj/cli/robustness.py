@@ -14,6 +14,7 @@ from manipose_mj.console.process import (
     hush_glfw,
     prepare_workers,
 )
+from manipose_mj.errors import InputError
 
 
 def robustness(
@@ -67,9 +68,15 @@ def robustness(
     from manipose_mj.robustness.success_maps import document, draw
     from manipose_mj.robustness.variation import Variation
     from manipose_mj.storage.cache_file import new_cache_file
+    from manipose_mj.tasks.core.config import check_seed
 
     check_names((task,), objects)
     require_worlds(worlds)
+    check_seed(seed)
+    if not 1 <= plans <= worlds:
+        raise InputError(
+            f"plans is {plans}; expected at least 1, and at most one a world: {worlds}"
+        )
     variation = Variation(friction, mass, gains, latency_ms, shift_cm, turn_deg)
     chosen = available_engine(engine)
     with output.Progress("plans") as progress:

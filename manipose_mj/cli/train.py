@@ -68,6 +68,7 @@ def train_ppo(
     from manipose_mj.batch.making import available_engine
     from manipose_mj.cli.evaluate import check_names
     from manipose_mj.console import output
+    from manipose_mj.learning.trained import Trained
     from manipose_mj.learning.training import (
         POLICY_FILE,
         TrainingConfig,
@@ -92,6 +93,8 @@ def train_ppo(
     )
     out = out or Path("ppo") / task.rpartition("/")[2]
     check_folder(out, policy)
+    if policy is not None:
+        Trained.load(policy)  # drawing starts takes minutes
     kept = pool is not None and pool.exists()
     with output.working_on("drawing starts"):
         drawn = training_pool(config, pool)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
@@ -28,6 +28,8 @@ def view(
 
     check_names((task,), objects)
     require_display()
+    from contextlib import ExitStack
+
     import numpy as np
 
     from manipose_mj import suite
@@ -38,11 +40,20 @@ def view(
     environment = suite.make(EnvConfig(task, obs_mode="state", objects=objects or None))
     environment.reset(episode)
     action = np.append(HOME, MAX_OPENING)
-    physics = environment.physics
-    with open_viewer(physics.model.ptr, physics.data.ptr) as window:
-        while window.is_running():
+    shown: Any = None
+    with ExitStack() as stack:
+        while True:
+            physics = environment.physics
+            if physics.model.ptr is not shown:
+                # Of the first episode, or of one with other objects.
+                stack.close()
+                shown = physics.model.ptr
+                window = stack.enter_context(open_viewer(shown, physics.data.ptr))
+            if not window.is_running():
+                return
             due = time.monotonic() + environment.control_timestep()
             with window.lock():
                 environment.step(action)
-            window.sync()
+            if environment.physics.model.ptr is shown:
+                window.sync()
             time.sleep(max(0.0, due - time.monotonic()))

@@ -46,8 +46,11 @@ def object_observation(
     seed: int,
     mesh: Mapping[str, np.ndarray] | None,
 ) -> Observation:
-    """The observation of one object; the keys are the module's, colours are those of the points' pixels."""
-    cloud = np.asarray(points, np.float32)
+    """The observation of one object; the keys are the module's, colours are those of the points' pixels.
+
+    All arrays are the estimator's own, which may change them.
+    """
+    cloud = np.array(points, np.float32)
     image = cloud.astype(float) @ intrinsics.T
     column, row = np.round(image[:, :2] / image[:, 2:]).astype(int).T
     height, width = depth.shape
@@ -55,16 +58,18 @@ def object_observation(
     found = {
         "category": category,
         "cloud": cloud,
-        "normals": np.asarray(normals, np.float32),
+        "normals": np.array(normals, np.float32),
         "colours": colours,
-        "depth": np.asarray(depth, np.float32),
-        "rgb": rgb,
-        "mask": mask,
-        "intrinsics": np.asarray(intrinsics, float),
-        "camera_pose": np.asarray(camera_pose, float),
+        "depth": np.array(depth, np.float32),
+        "rgb": np.array(rgb),
+        "mask": np.array(mask),
+        "intrinsics": np.array(intrinsics, float),
+        "camera_pose": np.array(camera_pose, float),
         "seed": seed,
     }
-    return found if mesh is None else {**found, "mesh": dict(mesh)}
+    if mesh is None:
+        return found
+    return {**found, "mesh": {name: np.array(values) for name, values in mesh.items()}}
 
 
 def sent_mesh(mesh: trimesh.Trimesh) -> dict[str, np.ndarray]:

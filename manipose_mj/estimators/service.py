@@ -6,6 +6,8 @@ import atexit
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+import numpy as np
+
 from manipose_mj.errors import ServerLostError
 from manipose_mj.estimators.answer import EstimatorFailedError, checked_answer
 from manipose_mj.estimators.observation import Observation
@@ -85,9 +87,10 @@ class EstimatorService:
           EstimatorFailedError: It raised an error or gave no pose; the message names it.
           ServerLostError: Its server is there no more.
         """
+        mesh = observation.get("mesh")
+        given = None if mesh is None else {name: np.array(values) for name, values in mesh.items()}
         try:
-            answer = self.estimator.estimate(observation)
-            return checked_answer(answer, observation.get("mesh"))
+            return checked_answer(self.estimator.estimate(observation), given)
         except (ServerLostError, MemoryError):
             raise
         except EstimatorFailedError as error:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
 from manipose_mj.errors import InputError
+from manipose_mj.user_code import factory_arguments
 from manipose_mj.wire.client import is_address
 
 
@@ -34,13 +34,12 @@ class EstimatorSettings:
             raise InputError(
                 f"--estimator {self.name}: a server takes no --estimator-args; give them to it"
             )
-        if not isinstance(self._parsed(), dict):
-            raise InputError(f"--estimator-args {self.arguments}: expected a JSON object")
+        _ = self.keywords  # if they are none
 
     @property
     def keywords(self) -> dict[str, Any]:
         """The factory's arguments."""
-        return {} if self.arguments is None else self._parsed()
+        return factory_arguments(self.arguments, "--estimator-args")
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -59,12 +58,6 @@ class EstimatorSettings:
         if self.arguments is not None:
             words += ["--estimator-args", self.arguments]
         return [*words, "--give-cad"] if self.give_cad else words
-
-    def _parsed(self) -> Any:
-        try:
-            return json.loads(self.arguments or "{}")
-        except ValueError as error:
-            raise InputError(f"--estimator-args {self.arguments}: no JSON ({error})") from None
 
 
 def chosen_estimator(

@@ -24,7 +24,12 @@ from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
-from manipose_mj.evaluation.protocol.own_assets import digest_of, find_assets, pool_folders
+from manipose_mj.evaluation.protocol.own_assets import (
+    built_assets,
+    digest_of,
+    find_assets,
+    pool_folders,
+)
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -64,7 +69,8 @@ class EvaluationConfig:
       episodes: Number per task.
       seed: Base seed, from which every episode's own seed follows.
       pose: Where the baseline takes object poses from.
-      jobs: Episodes that run at the same time, each on one core. Results do not depend on it.
+      jobs: Episodes that run at the same time, each on one core; of the engine `c`, processes. Results do not
+        depend on it.
       objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
         folders of them.
       protocol: Version of the protocol whose seeds and objects to take instead of `seed` and the training
@@ -127,6 +133,10 @@ class EvaluationConfig:
                 raise InputError(f"worlds is {self.batch.worlds}; expected at least 1")
             if self.policy is None:
                 raise InputError("batched worlds play policies; name one by --policy")
+            if self.policy.execute is not None:
+                raise InputError("--execute: in batched worlds a policy gives one action at a time")
+            if self.dask is not None:
+                raise InputError("--dask: batched worlds run on this machine; leave out --engine")
         self._check_errors()
         self._check_grasps()
         if self.protocol is not None:
@@ -199,10 +209,13 @@ class EvaluationConfig:
 
     @property
     def assets_digest(self) -> str | None:
-        """Which builds of the user's assets a protocol's episodes use; None where all are built in."""
-        if self.protocol is None or not self.assets:
-            return None
-        return digest_of(find_assets(self.protocol, self.tasks, self.assets).values())
+        """Which builds of the user's assets the episodes use; None where all are built in."""
+        if self.protocol is not None and self.assets:
+            return digest_of(find_assets(self.protocol, self.tasks, self.assets).values())
+        from manipose_mj.tasks.core.object_selection import is_folder  # loads the simulator
+
+        folders = [each for each in self.objects or () if is_folder(each)]
+        return digest_of(built_assets(folders)) if folders else None
 
     @property
     def poses(self) -> dict[str, str]:

@@ -160,7 +160,11 @@ def play(
 
     limits = environment.action_spec()
     features = None if settings is None else Features(environment)
-    space = ActionSpace(limits.minimum, limits.maximum, task.control_mode.name, rules.hz)
+    droid = settings is not None and settings.obs_format == "droid"
+    low, high = limits.minimum, limits.maximum
+    if droid:
+        low, high = np.append(low[:-1], 0.0), np.append(high[:-1], 1.0)
+    space = ActionSpace(low, high, task.control_mode.name, rules.hz)
     outcome = Outcome()
     try:
         policy.reset(
@@ -172,7 +176,6 @@ def play(
     except StageFailure as failure:
         outcome.failure = failure
     else:
-        droid = settings is not None and settings.obs_format == "droid"
         rollout = Rollout(
             environment,
             policy,

@@ -100,6 +100,8 @@ class PlannerSettings:
         given: dict[str, Any] = {"kind": self.kind}
         if self.model is not None:
             given["model"] = self.model
+        if self.base_url is not None:
+            given["base url"] = without_secrets(self.base_url)
         if self.instruction is not None:
             given["instruction"] = self.instruction
         if self.replay is not None:

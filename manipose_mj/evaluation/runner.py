@@ -149,14 +149,14 @@ def evaluate(
     """
     config.check_assets()
     config, metadata = _checked_policy(config)
-    _check_estimator(config)
+    said = {"policy metadata": metadata, "estimator metadata": _estimator_metadata(config)}
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
         if config.dask is None:  # workers elsewhere may have keys of their own
             config.planner.language_model()
         runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
-    identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}}
+    identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}, **said}
     del identity["platform version"]  # a new kernel changes no result
     with cluster(config.dask), results_file(config.out) as file:
         results = kept_results(config.out, identity, file, resume=resume)
@@ -165,7 +165,6 @@ def evaluate(
             run = {
                 **identity,
                 "masks": config.mask_source,
-                "policy metadata": metadata,
                 "jobs": config.jobs,
                 "command": config.command,
                 "machine": machine(),
@@ -216,13 +215,16 @@ def _checked_policy(config: EvaluationConfig) -> tuple[EvaluationConfig, dict[st
     return told, metadata_of(policy)
 
 
-def _check_estimator(config: EvaluationConfig) -> None:
-    """Make the estimator, so that what is not there is told before anything is written."""
-    if config.estimator is not None:
-        service = load_estimator(config.estimator)
-        if config.jobs > 1 or config.dask is not None:
-            service.close()  # workers make their own
-            load_estimator.cache_clear()
+def _estimator_metadata(config: EvaluationConfig) -> dict[str, Any]:
+    """What the estimator says of itself; makes it, so that what is not there is told before anything is written."""
+    if config.estimator is None:
+        return {}
+    service = load_estimator(config.estimator)
+    said = metadata_of(service.estimator)
+    if config.jobs > 1 or config.dask is not None:
+        service.close()  # workers make their own
+        load_estimator.cache_clear()
+    return said
 
 
 def _outcomes(

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from manipose_mj.batch.observations import Observation
 from manipose_mj.batch.worlds import State, Worlds
@@ -28,7 +28,7 @@ class BraxState(NamedTuple):
       reward: Of the last step.
       done: 1 where an episode ended with it; `obs` is then the next one's first.
       metrics: `success` and `success_once` of the episode, as numbers.
-      info: `truncation`, 1 where it ended at the horizon; `steps`, of the present episode; `final_obs`, before it began;
+      info: `truncation`, 1 where it ended at the horizon; `steps`, of the episode that the last step was of; `final_obs`, before it began;
         `overflowed`.
     """
 
@@ -80,16 +80,18 @@ class BraxWorlds:
             raise InputError(
                 f"keys of shape {keys} for {self.worlds.count} worlds; expected one, or one a world"
             )
-        return _as_brax(self.worlds.reset(rng[0] if keys else rng))
+        begun = self.worlds.reset(rng[0] if keys else rng)
+        return _as_brax(begun, begun.count)
 
     def step(self, state: BraxState, action: Float[Array, "worlds n"]) -> BraxState:
         """Go on by one control step; where an episode ends, the next begins."""
         low, high = self.worlds.lower, self.worlds.upper
         bounded = jnp.clip(action, -1.0, 1.0)
-        return _as_brax(self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low)))
+        after = self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low))
+        return _as_brax(after, state.data.count + 1)
 
 
-def _as_brax(state: State) -> BraxState:
+def _as_brax(state: State, steps: Int[Array, " worlds"]) -> BraxState:
     return BraxState(
         data=state,
         obs=_flat(state.observation),
@@ -101,7 +103,7 @@ def _as_brax(state: State) -> BraxState:
         },
         info={
             "truncation": state.truncated.astype(jnp.float32),
-            "steps": state.count,
+            "steps": steps,
             "final_obs": _flat(state.final_observation),
             "overflowed": state.overflowed,
         },

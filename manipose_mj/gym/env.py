@@ -220,7 +220,8 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
     """What a reset asks for.
 
     Raises:
-      InputError: A seed or start index is no 32-bit number, the goal is no pose, or the options are no mapping.
+      InputError: A seed or start index is no 32-bit number, the goal is no pose, a name is no text, or the options
+        are no mapping.
     """
     if not isinstance(options, Mapping):
         raise InputError(f"reset options are {options!r}; expected a mapping of names")
@@ -234,9 +235,15 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
     if index is not None:
         check_seed(index, "start_index")
     if "goal" in asked:
-        pose = np.asarray(asked["goal"], float)
+        try:
+            pose = np.asarray(asked["goal"], float)
+        except (TypeError, ValueError):
+            raise InputError("goal is no array of numbers; expected a pose, 4 x 4") from None
         check_pose(pose)
         asked["goal"] = tuple(map(tuple, pose.tolist()))
+    for name in asked.keys() - {"goal"}:
+        if not isinstance(asked[name], str):
+            raise InputError(f"{name} is {asked[name]!r}; expected a name")
     return EpisodeSpec(seed if index is None else int(index), **asked)
 
 

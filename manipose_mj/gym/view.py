@@ -39,9 +39,9 @@ class View:
         if self._model is not model:
             # The first reset compiles the model anew.
             self.close()
-            self._model = model
             opened = open_viewer(model, data) if self._mode == "human" else self._painter(model)
             self._shown = self._stack.enter_context(opened)
+            self._model = model
         if self._mode == "human":
             self._shown.sync()
             return None

@@ -142,15 +142,21 @@ def train(
       on_progress: Called with each new row of the curve.
 
     Raises:
-      InputError: The engine cannot run here, the updates need more worlds, or the policy to go on from is none.
+      InputError: The engine cannot run here, the updates need more worlds, or the policy to go on from is none, or another task's.
     """
     ppo = config.ppo
     before = None if config.policy is None else Trained.load(config.policy)
     if config.worlds * ppo.steps < ppo.minibatches:
         raise InputError(f"{config.worlds} worlds are too few for {ppo.minibatches} minibatches")
+    name = frame_of(config.task, pool.layout.frames)
+    if before is not None and before.frame != name:
+        raise InputError(
+            f"{config.policy}: was trained on {before.task}, about {FRAMES[before.frame].NEEDS}; {config.task} takes "
+            f"a policy about {FRAMES[name].NEEDS}"
+        )
     started = time.monotonic()
     worlds = from_pool(pool, config.worlds, available_engine(config.engine))
-    frame = FRAMES[frame_of(config.task, pool.layout.frames)]
+    frame = FRAMES[name]
     learning = Ppo(worlds, frame.features, frame.command, grip.ACTIONS, ppo)
     learner = learning.begin(jax.random.key(config.seed))
     if before is not None:

@@ -93,9 +93,11 @@ class BaselinePolicy:
         """Plan anew.
 
         Raises:
-          InputError: Actions are not those it makes.
+          InputError: Actions are not those it makes, or it was attached to no environment.
         """
-        timestep = self._environment.task.control_timestep if self._environment else 0.0
+        if self._environment is None:
+            raise InputError("the baseline acts in an environment; call attach(environment) first")
+        timestep = self._environment.task.control_timestep
         if action_space.control_mode != _MODE or round(action_space.hz * timestep, 9) != 1:
             raise InputError(
                 f"the baseline acts in {_MODE} at {1 / timestep:g} Hz; got {action_space.control_mode} "

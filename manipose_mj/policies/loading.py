@@ -2,37 +2,15 @@
 
 from __future__ import annotations
 
-import json
+import math
 from functools import lru_cache
 from typing import Any
 
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.policies.client import RemotePolicy
 from manipose_mj.policies.protocol import Policy
-from manipose_mj.user_code import import_user_module, search_working_folder
+from manipose_mj.user_code import factory_arguments, import_user_module, search_working_folder
 from manipose_mj.wire.client import is_address
-
-
-def policy_arguments(text: str | None) -> dict[str, Any]:
-    """The keyword arguments of a factory.
-
-    Args:
-      text: A JSON object; None: no arguments.
-
-    Raises:
-      InputError: It is none.
-    """
-    if text is None:
-        return {}
-    try:
-        arguments = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"--policy-args {text}: no JSON ({error})") from None
-    if not isinstance(arguments, dict):
-        raise InputError(
-            f'--policy-args {text}: expected a JSON object, such as {{"path": "a.pt"}}'
-        )
-    return arguments
 
 
 @lru_cache(maxsize=1)
@@ -47,7 +25,7 @@ def load_policy(name: str, arguments: str | None = None) -> Policy:
       InputError: There is no such module or factory, it fails, or what it makes is no policy; nobody serves
         one at the address, or there are arguments for it.
     """
-    keywords = policy_arguments(arguments)
+    keywords = factory_arguments(arguments, "--policy-args")
     if is_address(name):
         if keywords:
             raise InputError(f"--policy {name}: a server takes no --policy-args; give them to it")
@@ -69,12 +47,21 @@ def load_policy(name: str, arguments: str | None = None) -> Policy:
     return policy
 
 
-def metadata_of(policy: Policy) -> dict[str, Any]:
-    """What a policy says of itself, as far as JSON can hold it; empty for those that say nothing."""
-    said = getattr(policy, "metadata", {})
-    if not isinstance(said, dict):
-        return {}
-    return json.loads(json.dumps(said, default=str))
+def metadata_of(method: object) -> dict[str, Any]:
+    """What a policy or estimator says of itself, as far as JSON can hold it; empty for those that say nothing."""
+    said = getattr(method, "metadata", {})
+    return plain(said) if isinstance(said, dict) else {}
+
+
+def plain(value: Any) -> Any:
+    """What a stranger says, as JSON can hold it: all else, and numbers that are not finite, as text."""
+    if isinstance(value, dict):
+        return {str(name): plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return value if isinstance(value, float) and math.isfinite(value) else str(value)
 
 
 def _factory(name: str) -> Any:

@@ -17,7 +17,7 @@ class ActionSpace:
     """What actions an episode takes.
 
     Attributes:
-      low: Least values; the last number is the gripper's opening [m].
+      low: Least values; the last number is the gripper's opening [m], in DROID's format 0 (open) to 1 (shut).
       high: Greatest values; what lies beyond is clipped and counted.
       control_mode: What the numbers mean, such as `"pd_joint_pos"`.
       hz: Actions per second of simulated time.

@@ -1,4 +1,4 @@
-"""Serves a policy over a websocket, for evaluators of this package, openpi's clients and RoboArena's."""
+"""Serves a policy over a websocket, for evaluators of this package and openpi's clients."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from manipose_mj.policies.protocol import ActionSpace, Policy
 from manipose_mj.wire.framing import pack, unpack
 
 logger = logging.getLogger(__name__)
+_TOLD = ("task", "instruction", "seed", "action_space")
 
 
 class PolicyServer:
@@ -69,11 +70,12 @@ class PolicyServer:
 
     def _converse(self, connection: ServerConnection) -> None:
         connection.send(pack(self._metadata))
-        policy: Policy = self._make()
+        policy: Policy | None = None
         try:
             for message in connection:
                 try:
                     with self._one_at_a_time:
+                        policy = self._make() if policy is None else policy
                         answer = pack(_answered(policy, unpack(message)))  # type: ignore[arg-type]
                 except Exception:
                     logger.exception("the policy raised")
@@ -94,6 +96,9 @@ def _answered(policy: Policy, message: dict[str, Any]) -> dict[str, Any]:
         return {k: np.asarray(v) if k in ("action", "actions") else v for k, v in answer.items()}
     if endpoint != "reset":
         raise ValueError(f"unknown endpoint {endpoint!r}; expected 'infer' or 'reset'")
+    lacking = [name for name in _TOLD if name not in message]
+    if lacking:
+        raise ValueError(f"a reset without {', '.join(lacking)}; expected {', '.join(_TOLD)}")
     space = message["action_space"]
     policy.reset(
         task=message["task"],

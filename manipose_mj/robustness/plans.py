@@ -56,8 +56,11 @@ def recorded_plans(
       on_progress: Called with the number of plans recorded and that wanted.
 
     Raises:
-      InputError: The folder holds no success of the task, or the baseline fails too often.
+      InputError: The folder holds no success of the task, or sets of it with other objects than each other's; or the
+        baseline fails too often.
     """
+    if count < 1:
+        raise InputError(f"plans is {count}; expected at least 1")
     if source != SEEDS:
         return _read(task, Path(source), count)
     with tempfile.TemporaryDirectory(prefix="manipose-plans-") as folder:
@@ -80,6 +83,11 @@ def _read(task: str, folder: Path, count: int) -> Plans:
             "`manipose demos record` makes them, or take --plan-from seeds"
         )
     kwargs = found[0].env_kwargs
+    for other in found[1:]:
+        if any(other.env_kwargs[name] != kwargs[name] for name in ("objects", "split")):
+            raise InputError(
+                f"{folder}: {other.path} and {found[0].path} have other objects; give one of them"
+            )
     config = EnvConfig(
         task,
         obs_mode="state",

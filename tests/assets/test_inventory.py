@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
 
@@ -64,3 +65,12 @@ def test_published_audit_is_what_a_build_finds(category, index, tmp_path):
     assert asset.graspable == (audited_grasps(category, index) >= MIN_HELD)
     (entry,) = in_folder(tmp_path)
     assert entry in select(built_in(), Filter(category=category))
+
+
+def test_objects_beyond_the_catalogue_are_of_no_split(tmp_path, monkeypatch):
+    folder = catalogue.load("box").folder
+    shutil.copytree(folder, tmp_path / "box_999")
+    path = tmp_path / "box_999" / "asset.json"
+    path.write_text(path.read_text().replace("box_000", "box_999"))
+    (entry,) = in_folder(tmp_path)
+    assert entry.name == "box_999" and entry.split is None

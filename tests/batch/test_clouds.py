@@ -103,14 +103,15 @@ def test_normals_are_those_of_the_cpu(noise):
 
 @pytest.mark.full
 def test_clouds_hold_points_of_the_instance_alone():
-    wanted = jnp.asarray([2, 2, 7], jnp.int32)
-    clouds = object_clouds(images(3), 0, wanted, 128, jax.random.key(0))
-    assert clouds.points.shape == (3, 128, 3)
+    # The last world has no such object, whose instance is that of the surroundings.
+    wanted = jnp.asarray([2, 2, 7, 0], jnp.int32)
+    clouds = object_clouds(images(4), 0, wanted, 128, jax.random.key(0))
+    assert clouds.points.shape == (4, 128, 3)
     mask = np.asarray(clouds.mask)
-    assert mask[:2].all() and not mask[2].any()
+    assert mask[:2].all() and not mask[2:].any()
     points, normals = np.asarray(clouds.points), np.asarray(clouds.normals)
     normal = np.array([-0.5, 0.1, 1.0]) / np.linalg.norm([-0.5, 0.1, 1.0])
     np.testing.assert_allclose(points[:2] @ normal, 0.75, atol=1e-4)
     inside = np.abs(points[:2, :, 0] / points[:2, :, 2]) < 0.2
     assert ((normals[:2] @ -normal)[inside] > 0.99).all()
-    assert not points[2].any() and not np.array_equal(points[0], points[1])
+    assert not points[2:].any() and not np.array_equal(points[0], points[1])

@@ -47,6 +47,14 @@ def test_at_the_horizon_the_next_start_follows_and_the_last_observation_is_kept(
     equal(worlds.step(state, action).simulation, worlds.step(fresh, action).simulation)
 
 
+def test_an_action_is_held_no_longer_than_to_the_horizon(worlds):
+    actions = wandering(3, 3)
+    at_end = worlds.step(worlds.at([7, 8, 7]), actions[0], 4)
+    beyond = worlds.step(worlds.at([7, 8, 7]), actions[0], 6)
+    assert np.all(np.asarray(beyond.truncated))
+    equal(beyond, at_end)
+
+
 def test_a_diverged_world_fails_alone_and_begins_anew(worlds):
     state = worlds.at([7, 7, 8])
     action = wandering(1, 3)[0]
@@ -122,6 +130,11 @@ def test_a_saved_state_goes_on_alike_in_other_worlds(worlds, tmp_path):
     file.write_bytes(b"nothing")
     with pytest.raises(InputError, match="no state of worlds"):
         other.restore(file)
+    worlds.save(state, file)
+    with np.load(file) as saved:
+        np.savez(file, **{name: saved[name] for name in saved.files if name != "leaf_2"})
+    with pytest.raises(InputError, match="parts are missing"):
+        other.restore(file)
 
 
 def test_reset_takes_every_start_equally_often(worlds):
@@ -173,6 +186,9 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
             worlds.step(state, action)
         with pytest.raises(InputError, match=r"have shape .* expected \(3, 8\)"):
             worlds.rollout(lambda observation, key, action=action: action, state, 2)
+    for steps, message in ((3, "the recording has 2 actions"), (-1, "steps is -1")):
+        with pytest.raises(InputError, match=message):
+            worlds.rollout(wandering(2, 3), state, steps)
     for hold in (0, -3):
         with pytest.raises(InputError, match="expected a whole number of control steps"):
             worlds.step(state, np.zeros((3, 8)), hold)

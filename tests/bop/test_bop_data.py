@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from manipose_mj.bop import export as exporting
 from manipose_mj.bop.dataset import read_data
-from manipose_mj.bop.results_csv import read_results
+from manipose_mj.bop.results_csv import Estimate, read_results
 from manipose_mj.bop.score import score
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
@@ -221,3 +223,37 @@ def test_a_data_set_that_lacks_a_file_names_it(data, tmp_path):
     (tmp_path / "test_targets_bop19.json").write_text("[")
     with pytest.raises(InputError, match=r"test_targets_bop19\.json: not JSON"):
         read_data(tmp_path)
+
+
+def test_a_time_is_that_of_an_image_however_many_objects_it_shows(data, tmp_path):
+    known = read_data(data)
+    one = known.targets[0]
+    other = next(target for target in known.targets if target.model != one.model)
+    beside = replace(other, scene=one.scene, image=one.image)
+    targets = (one, beside, known.targets[-1])
+    found = [
+        Estimate(t.scene, t.image, t.model, 1.0, t.truth, seconds)
+        for t, seconds in zip(targets, (4.0, 4.0, 1.0), strict=True)
+    ]
+    rows = score(found, replace(known, targets=targets), source=tmp_path)
+    assert rows[0]["n"] == 3 and rows[0]["seconds"] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("test_targets_bop19.json", "{}", "expected a list"),
+        ("camera.json", '{"width": "wide"}', "width is 'wide'"),
+        ("models_eval/models_info.json", '{"1": {"diameter": null}}', "model 1 cannot be read"),
+        ("models_eval/models_info.json", '{"1": []}', "model 1 cannot be read"),
+        ("test/000001/scene_camera.json", "[]", "image 0 cannot be read"),
+        ("test/000001/scene_gt.json", '{"0": ["a"]}', "image 0 has object 1 0 times"),
+        ("models_eval/obj_000001.ply", "ply\nformat ascii 1.0\n", "model 1 cannot be read"),
+    ],
+)
+def test_a_broken_data_set_is_one_line(data, tmp_path, name, content, message):
+    shutil.copytree(data, tmp_path / "set")
+    assert (tmp_path / "set" / name).is_file()
+    (tmp_path / "set" / name).write_text(content)
+    with pytest.raises(InputError, match=message):
+        read_data(tmp_path / "set")

@@ -255,3 +255,21 @@ def test_a_right_answer_of_our_own_class_stays_as_it_is():
     np.testing.assert_array_equal(found.pose, np.eye(4))
     assert np.isnan(found.extents).all() and found.confidence == 0.5
     np.testing.assert_allclose(found.hypotheses[0].pose, other.pose)
+
+
+def test_an_estimator_that_changes_what_it_is_given_changes_nothing_else(views):
+    class Millimetres:
+        def estimate(self, observation):
+            for values in (observation["cloud"], observation["mesh"]["vertices"]):
+                values *= 1000
+            return {"pose": np.eye(4), "score": 0.5}
+
+    seen = views[0]
+    before = np.array(seen.cloud.points)
+    observation = view_observation(seen, seed=0, give_cad=True)
+    lengths = np.ptp(observation["mesh"]["vertices"], axis=0)
+    found = EstimatorService("a", Millimetres()).estimate(observation)
+    np.testing.assert_allclose(found.extents, lengths, rtol=1e-5)
+    np.testing.assert_array_equal(seen.cloud.points, before)
+    again = view_observation(seen, seed=0, give_cad=True)
+    np.testing.assert_allclose(np.ptp(again["mesh"]["vertices"], axis=0), lengths)

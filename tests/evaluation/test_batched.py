@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -97,7 +98,7 @@ def config(out: Path, policy: str, batch: BatchSettings | None, **changes) -> Ev
 def test_verdicts_are_those_of_single_environments(tmp_path, stop):
     alone = evaluate(config(tmp_path / "alone", "Puller", None, stop=stop))
     batch = BatchSettings("c", 2)
-    together = evaluate(config(tmp_path / "together", "Puller", batch, stop=stop))
+    together = evaluate(replace(config(tmp_path / "together", "Puller", batch, stop=stop), jobs=2))
     assert any(result.success_at_end for result in together)
     for one, other in zip(alone, together, strict=True):
         for name in ("seed", "object", "success_once", "success_at_end", "failure", "pose_source"):
@@ -157,3 +158,8 @@ def test_worlds_need_an_engine_and_a_policy(tmp_path, capsys):
     assert "batched worlds play policies" in capsys.readouterr().err
     with pytest.raises(InputError, match="worlds is 0"):
         config(tmp_path, "Puller", BatchSettings("c", 0))
+    batch = BatchSettings("c", 2)
+    with pytest.raises(InputError, match="a policy gives one action at a time"):
+        config(tmp_path, "Puller", batch, execute=2)
+    with pytest.raises(InputError, match="leave out --engine"):
+        replace(config(tmp_path, "Puller", batch), dask="tcp://localhost:1")

@@ -36,6 +36,14 @@ def test_an_empty_file_of_records_is_told_before_a_planner_is_made(tmp_path):
         PlannerSettings("replay", replay=tmp_path / "none.jsonl").language_model()
 
 
+def test_results_of_two_endpoints_do_not_belong_together():
+    one, other = (
+        PlannerSettings("llm", model="m", base_url=f"http://me:key@localhost:{port}/v1")
+        for port in (1, 2)
+    )
+    assert one.identity != other.identity and "key" not in str(one.identity)
+
+
 def test_words_hold_no_secrets():
     words = PlannerSettings("llm", "m", "http://me:pw@host:1/v1?api-key=s").words
     assert words[words.index("--base-url") + 1] == "http://host:1/v1"

@@ -147,6 +147,24 @@ def test_resume_refuses_another_configuration(tmp_path: Path, change: dict, name
         evaluate(config(tmp_path, **change), resume=True, runner=fake.make_runner())
 
 
+def test_resume_refuses_objects_that_were_built_again(tmp_path: Path) -> None:
+    asset = tmp_path / "assets" / "mug"
+    asset.mkdir(parents=True)
+
+    def built(generator: str) -> None:
+        provenance = {"source": "mesh", "inputs": {"mug.obj": "1"}, "generator": generator}
+        document = {"schema_version": 1, "name": "mug", "provenance": provenance}
+        (asset / "asset.json").write_text(json.dumps(document))
+
+    built("one")
+    asked = config(tmp_path / "out", objects=(str(asset.parent), "bowl_000"))
+    evaluate(asked, runner=fake.make_runner())
+    evaluate(asked, resume=True, runner=fake.make_runner())
+    built("two")
+    with pytest.raises(InputError, match="its results have assets sha256 "):
+        evaluate(asked, resume=True, runner=fake.make_runner())
+
+
 def test_resume_adds_tasks_and_episodes(tmp_path: Path) -> None:
     diary = tmp_path / "diary"
     out = tmp_path / "out"

@@ -37,7 +37,7 @@ def test_a_scan_sees_what_the_worlds_do_and_where_episodes_end(env):
     _, steps = jax.lax.scan(one, first, actions)
     np.testing.assert_array_equal(steps.done, [[0, 0], [0, 0], [1, 1], [0, 0]])
     np.testing.assert_array_equal(steps.info["truncation"], steps.done)
-    np.testing.assert_array_equal(np.asarray(steps.info["steps"])[:, 0], [1, 2, 0, 1])
+    np.testing.assert_array_equal(np.asarray(steps.info["steps"])[:, 0], [1, 2, 3, 1])
     assert not np.array_equal(steps.obs[2], steps.info["final_obs"][2])
     np.testing.assert_array_equal(steps.obs[1], steps.info["final_obs"][1])
     low, high = env.worlds.lower, env.worlds.upper

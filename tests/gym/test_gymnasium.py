@@ -220,7 +220,7 @@ def test_unknown_modes_are_one_line_with_the_nearest_names(options, said):
 def test_other_wrong_input_is_one_line(env, monkeypatch):
     with pytest.raises(InputError, match="seed is -1"):
         env.reset(seed=-1)
-    for goal in (np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)):
+    for goal in (np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan), "abc", [[1], [2, 3]]):
         with pytest.raises(InputError, match="goal"):
             env.reset(options={"goal": goal})
     with pytest.raises(InputError, match="expected a mapping of names"):
@@ -229,6 +229,8 @@ def test_other_wrong_input_is_one_line(env, monkeypatch):
         env.reset(options={"start_index": -1})
     with pytest.raises(InputError, match="mug_00"):
         env.reset(options={"object": "mug_00"})
+    with pytest.raises(InputError, match="object is 5; expected a name"):
+        env.reset(options={"object": 5})
     env.reset(seed=0)
     for action in (np.zeros(7), np.full(8, np.nan)):
         with pytest.raises(InputError, match="8 finite numbers"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -12,6 +13,7 @@ import pytest
 
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
+from manipose_mj.learning import trained
 from manipose_mj.learning.frames import frame_of
 from manipose_mj.learning.trained import Trained
 from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, check_folder, training_pool
@@ -68,6 +70,25 @@ def test_bad_numbers_end_in_one_line(capsys):
     assert "nowhere.npz: no trained policy" in capsys.readouterr().err
     assert main(["train", "ppo", "articulated/open_midle_drawer"]) == EXIT_INPUT
     assert "open_middle_drawer" in capsys.readouterr().err
+
+
+def test_a_policy_about_something_else_is_no_beginning(tmp_path, capsys):
+    shipped = str(Path(trained.__file__).parent / "weights" / "open_middle_drawer.npz")
+    words = [
+        "single_object/target_pose",
+        "--engine",
+        "c",
+        "--worlds",
+        "2",
+        "--starts",
+        "1",
+        "--objects",
+        "box_000",
+    ]
+    out = ["--out", str(tmp_path / "ppo")]
+    assert main(["train", "ppo", *words, *out, "--policy", shipped]) == EXIT_INPUT
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "about a task that opens or shuts one drawer or door" in said and "one object" in said
 
 
 @pytest.mark.full

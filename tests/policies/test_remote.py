@@ -12,6 +12,7 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
+from websockets.sync.client import connect
 from websockets.sync.server import serve as websocket_server
 
 from manipose_mj.errors import InputError, ServerLostError
@@ -188,3 +189,17 @@ def test_a_server_of_something_else_is_no_policy_server(first):
 
     with stranger(converse) as address, pytest.raises(InputError, match="no policy server"):
         RemotePolicy(address).open()
+
+
+def test_a_factory_that_fails_and_a_reset_of_other_kinds_are_told_to_the_client():
+    def broken():
+        raise RuntimeError("no weights")
+
+    with served(broken) as server:
+        remote = RemotePolicy(server.address)
+        with pytest.raises(StageFailure, match="no weights"):
+            remote.reset(**EPISODE)
+    with served(Reaching) as server, connect(server.address, compression=None) as connection:
+        connection.recv()
+        connection.send(pack({"endpoint": "reset", "session_id": "a"}))
+        assert "a reset without task, instruction, seed, action_space" in connection.recv()

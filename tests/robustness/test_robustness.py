@@ -8,6 +8,7 @@ import pytest
 
 from manipose_mj import suite
 from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.demos import layout
 from manipose_mj.errors import InputError
 from manipose_mj.robustness import replay
@@ -94,13 +95,22 @@ def test_maps_count_valid_worlds_alone(tmp_path):
     assert (tmp_path / "map.png").stat().st_size > 10_000
 
 
-def test_wrong_input_is_one_line(tmp_path):
+def test_wrong_input_is_one_line(tmp_path, capsys):
     with pytest.raises(InputError, match="--friction is 0.5; expected a factor of 1 or more"):
         Variation(friction=0.5)
     with pytest.raises(InputError, match="--shift-cm is -1"):
         Variation(shift_cm=-1.0)
     with pytest.raises(InputError, match="holds no demonstrations"):
         recorded_plans(TASK, str(tmp_path), 1)
+    with pytest.raises(InputError, match="plans is 0"):
+        recorded_plans(TASK, str(tmp_path), 0)
+    for words, said in (
+        ("--plans 8 --worlds 4", "at most one a world: 4"),
+        ("--plans -1", "plans is -1"),
+        ("--seed -1", "seed is -1"),
+    ):
+        assert main(["robustness", TASK, *words.split()]) == EXIT_INPUT
+        assert said in capsys.readouterr().err
 
 
 @pytest.mark.full

@@ -92,13 +92,13 @@ def object_clouds(
     Args:
       images: Of the worlds.
       camera: Which of their cameras.
-      instance: Of each world, as segmentation numbers it.
+      instance: Of each world, as segmentation numbers it; 0: none, whose cloud is empty.
       size: Points; fewer where fewer are seen.
       key: Chooses the pixels.
     """
 
     def one(depth: Array, seen: Array, pinhole: Array, wanted: Array, key: PRNGKeyArray) -> Clouds:
-        mask = (seen == wanted) & (depth > 0)
+        mask = (seen == wanted) & (depth > 0) & (wanted > 0)
         chance = jnp.where(mask.ravel(), jax.random.uniform(key, (depth.size,)), -1.0)
         chance, pixels = jax.lax.top_k(chance, size)
         valid = chance >= 0

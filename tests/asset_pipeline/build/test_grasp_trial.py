@@ -152,3 +152,10 @@ def test_two_processes_write_the_same_bytes(tmp_path):
     for file in files:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
     assert sum((tmp_path / "one" / file).stat().st_size for file in files) < 300_000
+
+
+@pytest.mark.parametrize("name", ["hand", "left", "right", "finger_left", "hand_x"])
+def test_an_object_may_have_the_name_of_what_holds_it(name):
+    body = replace(BODIES["box"], name=name)
+    with scratch_model(body) as path:
+        Trial(path, ParallelJaw(), TrialConfig())

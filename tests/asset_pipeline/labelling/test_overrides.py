@@ -270,6 +270,11 @@ def test_builds_read_labels_and_know_when_an_entry_changed(tmp_path, caplog):
     assert "unknown object 'Blue_Bx'; did you mean Blue_Box" in caplog.text
     asset = read_asset(out / "Blue_Box")
     before = measured(asset)
+    middle = asset.label.pose @ np.append(asset.label.center, 1)
+    np.testing.assert_allclose(
+        before.label.pose @ np.append(before.label.center, 1), middle, atol=1e-5
+    )
+    assert np.linalg.norm(middle[:3]) > 0.01
     assert (asset.category, len(asset.label.symmetry.rotations)) == ("crate", 1)
     assert before.category != "crate" and len(before.label.symmetry.rotations) > 1
     np.testing.assert_allclose(asset.label.origin - before.label.origin, [0, 0, 0.01], atol=1e-5)

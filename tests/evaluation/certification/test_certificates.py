@@ -130,6 +130,12 @@ def test_a_shipped_certificate_solves_its_start(start):
     assert list(verify("v1", SHIPPED, [start], jobs=1)) == [(start, SHIPPED.solved[start])]
 
 
+def test_a_file_that_is_not_there_is_no_file_without_certificates(tmp_path, capsys):
+    words = ["protocol", "verify", "--tasks", TASK, "--episodes", "1"]
+    assert main([*words, "--certificates", str(tmp_path / "typo.json")]) == 2
+    assert "typo.json: no such file of certificates" in capsys.readouterr().err
+
+
 @pytest.mark.full
 def test_commands_find_and_replay(tmp_path, capsys):
     out = str(tmp_path / "c.json")
