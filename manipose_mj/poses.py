@@ -69,7 +69,7 @@ def quaternion_to_rotation(quaternion: Float[Array, "*b 4"]) -> Float[Array, "*b
 
 
 def rotation_to_quaternion(rotation: Float[Array, "*b 3 3"]) -> Float[Array, "*b 4"]:
-    """The `wxyz` quaternion of a rotation matrix, with a non-negative first non-zero entry.
+    """The `wxyz` quaternion of a rotation matrix, whose w is not negative.
 
     Of the four formulas that divide by one component each, the one with the largest component
     is taken (Shepperd 1978), without branches.

@@ -66,7 +66,7 @@ def make(
 ) -> composer.Environment:
     """The environment that a configuration describes; arguments as for `load`."""
     spec = named_task(config.task)
-    if isinstance(seed, int | float | np.number):
+    if seed is not None and not isinstance(seed, np.random.RandomState):
         check_seed(seed)
     return _made(spec, config, seed, environment_kwargs or {})
 

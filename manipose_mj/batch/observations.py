@@ -53,7 +53,7 @@ class Observer:
             f"{_ROBOT}/joint_velocities": now.velocities,
             f"{_ROBOT}/joint_torques": now.torques,
             f"{_ROBOT}/gripper_opening": now.fingers.sum(-1, keepdims=True),
-            f"{_ROBOT}/tcp_pose": pose_to_vector(tcp),
+            f"{_ROBOT}/tcp_pose": _tcp_vector(tcp),
         }
         world = self._world_poses(now, rows)
         cameras = invert(compose(now.camera_rotations * _OPENCV, now.camera_positions))
@@ -77,3 +77,10 @@ class Observer:
         first = len(layout.objects) + 2 * len(layout.parts)
         bodies = compose(now.rotations[:, first:], now.positions[:, first:])
         return jnp.concatenate([bodies @ self._frames[rows], self._goals[rows]], axis=1)
+
+
+def _tcp_vector(tcp: Float[Array, "worlds 4 4"]) -> Float[Array, "worlds 7"]:
+    """As `PandaRobot.tcp_vector`."""
+    vector = pose_to_vector(tcp)
+    sign = jnp.where(vector[:, 4:5] < 0, -1.0, 1.0)
+    return jnp.concatenate([vector[:, :3], sign * vector[:, 3:]], axis=-1)

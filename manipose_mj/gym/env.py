@@ -114,6 +114,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
           InputError: The seed is no 32-bit number, the task takes no such goal, or has nothing of that name.
         """
         self._require_open()
+        self._running = False  # until the reset has succeeded
         spec = _episode(seed, options or {})
         super().reset(seed=seed)
         step = self.environment.reset(spec)

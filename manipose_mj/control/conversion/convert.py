@@ -120,11 +120,13 @@ def _traced(environment: TaskEnvironment, recording: Recording) -> _Trace:
     with acting(environment, recording.mode, recording.seed):
         task, physics = task_of(environment), environment.physics
         servos = [*task.robot.actuators, task.robot.gripper_actuator]
+        assert task.start is not None
+        late = task.start.model.latency > 0  # what is converted will be as late again
         targets = [np.append(*task.robot.configuration(physics))]
         in_hand = [_in_hand(task, physics)]
         for action in recording.actions:
             environment.step(action, observe=False)
-            targets.append(np.array(physics.bind(servos).ctrl))
+            targets.append(task.target if late else np.array(physics.bind(servos).ctrl))
             in_hand.append(_in_hand(task, physics))
     return _Trace(np.array(targets), in_hand)
 

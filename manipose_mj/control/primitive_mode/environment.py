@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,7 @@ from manipose_mj.control.primitive_mode.tcp_primitives import Outcome, Status, T
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.poses import vector_to_pose
+from manipose_mj.tasks.core import snapshot
 from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -36,6 +38,15 @@ class PrimitiveConfig:
     max_primitives: int = 30
 
 
+@dataclass(frozen=True)
+class PrimitiveSnapshot:
+    """Attributes: environment: its snapshot; count: of primitives so far; last: what the last one gave."""
+
+    environment: snapshot.Snapshot
+    count: int
+    last: dm_env.TimeStep
+
+
 class PrimitiveEnvironment(dm_env.Environment):
     """A task whose actions are `move_to`, `grasp_at` and `release`.
 
@@ -50,8 +61,8 @@ class PrimitiveEnvironment(dm_env.Environment):
     One step is the whole motion, as many control steps of `pd_joint_pos` as that takes. The observation,
     reward and discount are those of the last; `primitive/status` tells how it went: 0 done, 1 no plan
     was found and nothing moved, 2 the gripper is empty though it should not be, 3 stopped short of the
-    pose. The controller that plans knows where everything is; what the policy sees is the task's. It
-    remembers nothing, so an episode restored into `environment` goes on as it did.
+    pose. The controller that plans knows where everything is and remembers nothing; what the policy sees is
+    the task's. `save` and `restore` take the place of `manipose_mj.tasks.core.snapshot`'s.
     """
 
     def __init__(self, environment: TaskEnvironment, config: PrimitiveConfig | None = None) -> None:
@@ -118,9 +129,8 @@ class PrimitiveEnvironment(dm_env.Environment):
 
     def reset(self, spec: EpisodeSpec | None = None) -> dm_env.TimeStep:
         """Start an episode; arguments as for `TaskEnvironment`."""
+        self._last = None  # where this fails, the next step begins an episode
         first = self._environment.reset(spec)
-        if self._controller is None or not self._controller.fits(self.physics):
-            self._controller = _Controller(self.task, self.physics)
         self._count = 0
         return self._told(first, Status.DONE)
 
@@ -130,9 +140,11 @@ class PrimitiveEnvironment(dm_env.Environment):
         Raises:
           InputError: The action is not eight finite numbers, or its quaternion is zero.
         """
-        if self._last is None or self._controller is None or self._last.last():
+        if self._last is None or self._last.last():
             return self.reset()
         kind, pose = _checked(action)
+        if self._controller is None or not self._controller.fits(self.physics):
+            self._controller = _Controller(self.task, self.physics)
         motion: Outcome = getattr(self._controller.primitives(), kind)(pose)
         self._count += 1
         timestep, status = self._last, None
@@ -152,6 +164,29 @@ class PrimitiveEnvironment(dm_env.Environment):
                 step_type=dm_env.StepType.LAST if over else dm_env.StepType.MID
             )
         return self._told(timestep, status)
+
+    def save(self) -> PrimitiveSnapshot:
+        """The present, between two primitives.
+
+        Raises:
+          InputError: It has not been reset yet.
+        """
+        saved = snapshot.save(self._environment)
+        assert self._last is not None
+        return PrimitiveSnapshot(saved, self._count, copy.deepcopy(self._last))
+
+    def restore(self, saved: PrimitiveSnapshot) -> Any:
+        """Put an environment of the same task and options back; what follows is the same.
+
+        Returns:
+          The observation of that moment.
+
+        Raises:
+          InputError: As of `manipose_mj.tasks.core.snapshot.restore`.
+        """
+        snapshot.restore(self._environment, saved.environment)
+        self._count, self._last = saved.count, copy.deepcopy(saved.last)
+        return saved.last.observation
 
     def close(self) -> None:
         """Free what the environment holds."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 import mujoco
@@ -199,16 +198,16 @@ class Panda(composer.Entity):
         return positions[at.angles].copy(), float(positions[at.fingers].sum())
 
     def tcp_vector(self, physics: mjcf.Physics) -> Float[np.ndarray, "7"]:
-        """The tool centre point's pose in the world frame: position [m], then quaternion wxyz."""
+        """The tool centre point's pose in the world frame: position [m], then quaternion wxyz, x not negative."""
         if physics.is_dirty:
             physics.forward()
         site, data = self.servos(physics).at.tcp, physics.data.ptr
         vector = np.empty(7)
         vector[:3] = data.site_xpos[site]
         mujoco.mju_mat2Quat(vector[3:], data.site_xmat[site])
-        # The sign of `rotation_to_quaternion`, which takes ten times as long.
-        first = next(part for part in vector[3:].tolist() if abs(part) > 1e-12)
-        vector[3:] *= math.copysign(1.0, first)
+        # A hand that points down is near (0, 1, 0, 0), where the sign of w would come and go.
+        if vector[4] < 0:
+            vector[3:] *= -1
         return vector
 
     def tcp_pose(self, physics: mjcf.Physics) -> Float[np.ndarray, "4 4"]:

@@ -14,6 +14,7 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.tasks.core.object_selection import select_assets
+from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.randomisation import STRENGTHS
 from manipose_mj.tasks.goals import RewardMode, Tolerance
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
@@ -58,8 +59,10 @@ class EnvConfig:
     latency: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.latency < 10:
-            raise InputError(f"latency is {self.latency} s; expected 0 to 10")
+        if not isinstance(self.latency, int | float | np.number) or not 0 <= self.latency < 10:
+            raise InputError(f"latency is {self.latency!r} s; expected a number from 0 to 10")
+        if not isinstance(self.sensors, SensorConfig):
+            raise InputError(f"sensors is a {type(self.sensors).__name__}; expected a SensorConfig")
         for what, value, known in (
             ("control mode", self.control_mode, (*CONTROL_MODES, PRIMITIVE)),
             ("reward mode", self.reward_mode, REWARD_MODES),
@@ -73,14 +76,26 @@ class EnvConfig:
         if chosen is not None:
             one = isinstance(chosen, str | Path | Asset)
             object.__setattr__(self, "objects", (chosen,) if one else tuple(chosen))
+            for each in self.objects or ():
+                if not isinstance(each, str | Path | Asset):
+                    raise InputError(f"objects: {each!r} is no name, folder or asset")
 
     def assets(self) -> tuple[Asset, ...] | None:
         """The objects chosen, loaded; None where the task shall use the built-in ones.
 
         Raises:
-          InputError: There is no built-in object or asset folder of a name.
+          InputError: There is no built-in object or asset folder of a name, or two assets have one name.
         """
-        return None if self.objects is None else select_assets(self.objects)
+        if self.objects is None:
+            return None
+        found: dict[str, Asset] = {}
+        for asset in select_assets(self.objects):
+            other = found.setdefault(asset.name, asset)
+            if other.folder != asset.folder:
+                raise InputError(
+                    f"{asset.folder}: has the name of {other.folder}; an episode names its objects: choose one"
+                )
+        return tuple(found.values())
 
 
 class EnvOptions(TypedDict, total=False):
@@ -125,7 +140,7 @@ class EpisodeSpec:
       goal: `T_world_label` that the object shall have in the end, rows of a `(4, 4)` matrix; None draws it.
 
     Raises:
-      InputError: The seed is no whole number from 0 to 2**32 - 1.
+      InputError: The seed is no whole number from 0 to 2**32 - 1, or the goal no pose.
     """
 
     seed: int | None = None
@@ -137,6 +152,12 @@ class EpisodeSpec:
     def __post_init__(self) -> None:
         if self.seed is not None:
             check_seed(self.seed)
+        if self.goal is not None:
+            try:
+                pose = np.asarray(self.goal, float)
+            except (TypeError, ValueError):
+                raise InputError("goal is no array of numbers; expected a pose, 4 x 4") from None
+            check_pose(pose)
 
 
 def check_seed(seed: Any, what: str = "seed") -> None:

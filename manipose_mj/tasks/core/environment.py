@@ -104,6 +104,7 @@ class TaskEnvironment(composer.Environment):
           PhysicsError: None of a few starts came to rest.
         """
         spec = spec or EpisodeSpec()
+        self._reset_next_step = True  # where this fails, the next step begins an episode
         if spec.seed is not None:
             self.random_state.seed(spec.seed)
         self.failure = self.failure_reason = ""
@@ -172,7 +173,10 @@ class TaskEnvironment(composer.Environment):
         self._task = scene.task
         self._physics, self._physics_proxy = scene.physics, scene.physics_proxy
         self._hooks, self._observation_updater = scene.hooks, scene.observation_updater
-        self._mjcf_never_compiled = scene.never_reset
+        if scene.never_reset:  # compiled before hooks could change it
+            self._hooks.initialize_episode_mjcf(self.random_state)
+            self._recompile_physics_and_update_observables()
+        self._mjcf_never_compiled = False
 
     def step(self, action: Any, *, observe: bool = True) -> dm_env.TimeStep:
         """Go on by one control step; after an episode's end, or before the first, reset.
@@ -219,6 +223,11 @@ class TaskEnvironment(composer.Environment):
             self._kept.clear()
             self.task.close()
             super().close()
+
+    def go_on(self, observation: Any, failure: str, failure_reason: str) -> None:
+        """What a restored episode has been so far: last seen, and how it failed."""
+        self._last_observation = observation
+        self.failure, self.failure_reason = failure, failure_reason
 
     def _remembered(self, step: dm_env.TimeStep) -> dm_env.TimeStep:
         self._last_observation = step.observation

@@ -55,6 +55,10 @@ MODEL_FIELDS = (
 )
 
 
+# Of a task, what the environment was made with.
+_OWN = ("env_config", "config", "task_config", "_action_shape")
+
+
 @dataclass(frozen=True)
 class Snapshot:
     """All that the rest of an episode depends on; arrays and plain values, so it can be pickled.
@@ -66,7 +70,9 @@ class Snapshot:
       task: What the task remembers of this episode.
       random_state: Of the environment's one generator.
       ended: Whether the episode was over.
-      name: Of the task, `"domain/name"`.
+      failure, failure_reason: Of the environment.
+      options: What environments must share for the rest of an episode to be the same: the task's name, its control
+        mode, randomisation and latency.
       objects: Of the scene; None where all episodes have the same.
     """
 
@@ -76,7 +82,9 @@ class Snapshot:
     task: dict[str, Any]
     random_state: Any
     ended: bool
-    name: str
+    failure: str
+    failure_reason: str
+    options: dict[str, Any]
     objects: SceneObjects | None = None
 
 
@@ -91,10 +99,12 @@ def save(environment: composer.Environment) -> Snapshot:
         simulation=read_simulation(model, data),
         model={name: np.array(getattr(model, name)) for name in MODEL_FIELDS},
         memory=task.control_mode.memory(),
-        task={k: copy.deepcopy(v) for k, v in vars(task).items() if _is_plain(v)},
+        task={k: copy.deepcopy(v) for k, v in vars(task).items() if k not in _OWN and _is_plain(v)},
         random_state=environment.random_state.get_state(),
         ended=environment._reset_next_step,
-        name=task.env_config.task,
+        failure=getattr(environment, "failure", ""),
+        failure_reason=getattr(environment, "failure_reason", ""),
+        options=_options(task),
         objects=getattr(environment, "scene_objects", None),
     )
 
@@ -102,15 +112,23 @@ def save(environment: composer.Environment) -> Snapshot:
 def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, np.ndarray]:
     """Put an environment of the same task and options back; what follows is the same.
 
+    Observations and rewards are of the environment's own modes.
+
     Returns:
       The observation of that moment.
 
     Raises:
-      InputError: The environment has not been reset yet, or its model is another one.
+      InputError: The environment has not been reset yet, is of another task or has other options, or its model is
+        another one.
     """
     task, model, data = _parts(environment)
-    same_task = snapshot.name == task.env_config.task
-    if same_task and snapshot.objects is not None and isinstance(environment, TaskEnvironment):
+    for name, value in _options(task).items():
+        if snapshot.options[name] != value:
+            raise InputError(
+                f"snapshot with {name} {snapshot.options[name]!r}; this environment has {value!r}: restore it in one "
+                f"of {snapshot.options['task']} with the same options"
+            )
+    if snapshot.objects is not None and isinstance(environment, TaskEnvironment):
         environment.use(snapshot.objects)
         task, model, data = _parts(environment)
     expected, found = state_size(model), len(snapshot.simulation.state)
@@ -120,7 +138,7 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     ):
         raise InputError(
             f"snapshot of {found} state values; this environment has {expected}: "
-            f"restore it in one of {snapshot.name} with the same options"
+            f"restore it in one of {snapshot.options['task']} with the same options"
         )
     for name, values in snapshot.model.items():
         getattr(model, name)[:] = values
@@ -134,12 +152,28 @@ def restore(environment: composer.Environment, snapshot: Snapshot) -> dict[str, 
     # Observations may have drawn noise.
     environment.random_state.set_state(snapshot.random_state)
     environment._reset_next_step = snapshot.ended
-    return updater.get_observation()
+    observation = updater.get_observation()
+    if isinstance(environment, TaskEnvironment):
+        environment.go_on(observation, snapshot.failure, snapshot.failure_reason)
+    return observation
+
+
+def _options(task: ManipulationTask) -> dict[str, Any]:
+    own = task.env_config
+    return {
+        "task": own.task,
+        "control mode": task.control_mode.name,
+        "randomisation": own.randomisation,
+        "latency": own.latency,
+    }
 
 
 def _parts(
     environment: composer.Environment,
 ) -> tuple[ManipulationTask, mujoco.MjModel, mujoco.MjData]:
+    if not isinstance(environment, composer.Environment):
+        kind = type(environment).__name__
+        raise InputError(f"{kind} is saved and restored by its own methods save and restore")
     task = environment.task
     if not isinstance(task, ManipulationTask):
         raise InputError(f"{type(task).__name__} is no task of this package; it cannot be saved")

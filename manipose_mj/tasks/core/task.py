@@ -165,6 +165,11 @@ class ManipulationTask(composer.Task):
         return next(e.asset.name for e in (*self.objects.values(), *self.articulated_objects))
 
     @property
+    def target(self) -> Float[np.ndarray, "8"]:
+        """Where the control mode sends the servos now, joint angles [rad] and opening [m]: before latency and limits."""
+        return self._target.copy()
+
+    @property
     def noise_seed(self) -> int | None:
         """Of the sensors, in this episode; None before the first."""
         return None if self.start is None else self.start.noise_seed
@@ -186,9 +191,7 @@ class ManipulationTask(composer.Task):
         """
         if self._physics is None:
             raise RuntimeError("the task is in no environment yet: its scene was not compiled")
-        if self._randomiser is None:
-            self._randomiser = self._make_randomiser(self._physics)
-            self._preview = Preview(self._physics, self.scene)
+        assert self._randomiser is not None and self._preview is not None
         spec = spec or EpisodeSpec()
         self._check_asked(spec)
         changes = self._randomiser.draw(rng)
@@ -305,7 +308,10 @@ class ManipulationTask(composer.Task):
         return self.control_mode.spec()
 
     def after_compile(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        self._physics, self._randomiser = physics, None
+        self._physics = physics
+        # Now, for episodes change the model.
+        self._randomiser = self._make_randomiser(physics)
+        self._preview = Preview(physics, self.scene)
 
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState

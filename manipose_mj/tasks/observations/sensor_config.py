@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class CameraView:
     def __post_init__(self) -> None:
         if not self.name or not self.name.replace("_", "").isalnum():
             raise InputError(f"camera name {self.name!r}: expected letters, digits and underscores")
+        for field in ("position", "target"):
+            object.__setattr__(self, field, _numbers(getattr(self, field)))
         numbers = (*self.position, *self.target)
         if len(numbers) != 6 or not np.isfinite(numbers).all() or self.position == self.target:
             raise InputError(
@@ -43,6 +46,14 @@ class CameraView:
             )
         if not 0 < self.fovy < 180:
             raise InputError(f"camera {self.name!r}: fovy {self.fovy} deg; expected 0 to 180")
+
+
+def _numbers(point: Any) -> tuple[float, ...]:
+    """A point of any kind as a tuple of numbers, which are not finite where it is none."""
+    try:
+        return tuple(map(float, point))
+    except (TypeError, ValueError):
+        return (np.nan,) * 3
 
 
 @dataclass(frozen=True)

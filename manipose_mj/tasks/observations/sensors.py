@@ -207,5 +207,7 @@ def _enable(
         each.enabled = "state" in modes or name in modes
     for name, each in observables.items():
         mode = name.split("/")[0]
-        images = mode == "camera" and not modes.isdisjoint(_IMAGES)
+        camera = name.partition("/")[2].rpartition("/")[0]
+        shown = {*_IMAGES, *(f"{image}/{camera}" for image in _IMAGES)}
+        images = mode == "camera" and not modes.isdisjoint(shown)
         each.enabled = mode in modes or name in modes or images

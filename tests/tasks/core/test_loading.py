@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ import manipose_mj
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.observations.sensors import SensorConfig
+from manipose_mj.tasks.observations.sensors import CameraView, SensorConfig
 from tests.few_objects import few, load
 from tests.tasks.episode_driver import HOLD
 
@@ -113,3 +114,46 @@ def test_dm_control_loads_the_same_episodes(task):
         assert step.observation.keys() == own.observation.keys()
         assert all(np.array_equal(step.observation[k], v) for k, v in own.observation.items())
         assert theirs.step(HOLD).reward in (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"seed": "abc"}, "seed is 'abc'"),
+        ({"latency": "0.1"}, "latency is '0.1' s"),
+        ({"sensors": {"height": 3}}, "sensors is a dict; expected a SensorConfig"),
+        ({"objects": [5]}, "objects: 5 is no name"),
+    ],
+)
+def test_options_of_other_kinds_are_one_line(options, said):
+    with pytest.raises(InputError, match=said) as caught:
+        suite.load("single_object", "target_pose", **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_assets_of_one_name_are_refused(tmp_path):
+    folder = catalogue.load("box", 0).folder
+    for place in ("one", "two"):
+        shutil.copytree(folder, tmp_path / place / "box_000")
+    with pytest.raises(InputError, match=r"two/box_000: has the name of .*one/box_000"):
+        suite.load("single_object", "target_pose", objects=[tmp_path / "one", tmp_path / "two"])
+    twice = [tmp_path / "one", str(tmp_path / "one" / "box_000")]
+    environment = suite.load("single_object", "target_pose", objects=twice)
+    environment.reset()
+    assert environment.task.object_name == "box_000"
+
+
+def test_an_own_camera_takes_arrays_and_a_key_of_it_brings_its_pose():
+    camera = CameraView("above", position=np.array([0.5, 0, 1.3]), target=[0.5, 0, 0])
+    with pytest.raises(InputError, match="expected two different points"):
+        CameraView("above", position=(0.5, 0), target="abc")
+    environment = suite.load(
+        "single_object",
+        "target_pose",
+        seed=0,
+        obs_mode="depth/above",
+        objects=["box_000"],
+        sensors=SensorConfig(cameras=("front", camera)),
+    )
+    expected = {"depth/above", "camera/above/pose", "camera/above/intrinsics"}
+    assert {*environment.reset().observation} == expected

@@ -12,6 +12,7 @@ import pytest
 from manipose_mj import suite
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.core.snapshot import restore, save
 from tests.few_objects import load
 
@@ -108,3 +109,75 @@ def test_a_snapshot_of_another_scene_is_refused():
     if len(save(first).simulation.state) != len(save(second).simulation.state):
         with pytest.raises(InputError, match="restore it in one of "):
             restore(second, save(first))
+
+
+def test_a_snapshot_of_another_task_or_other_options_is_refused():
+    mug = {"seed": 0, "obs_mode": "state", "objects": ["mug_000"]}
+    environment = suite.load("single_object", "target_pose", **mug)
+    environment.reset()
+    snapshot = save(environment)
+    for name, options, said in (
+        ("orientation", {}, "task 'single_object/target_pose'"),
+        ("target_pose", {"control_mode": "pd_ee_delta_pose"}, "control mode 'pd_joint_pos'"),
+        ("target_pose", {"latency": 0.1}, "latency 0.0"),
+    ):
+        other = suite.load("single_object", name, **mug, **options)
+        other.reset()
+        with pytest.raises(InputError, match=f"snapshot with {said}; this environment has"):
+            restore(other, snapshot)
+    dense = suite.load("single_object", "target_pose", **mug, reward_mode="dense")
+    dense.reset()
+    restore(dense, snapshot)
+    assert 0 < dense.step(_actions(1, 0)[0]).reward < 1
+
+
+def test_a_snapshot_is_restored_in_a_scene_that_was_compiled_and_never_reset():
+    objects = ["mug_000", "box_000"]
+    environment = suite.load(
+        "single_object", "target_pose", seed=0, obs_mode="state", objects=objects
+    )
+    first = environment.scene_objects.assets[0].name
+    (other,) = {*objects} - {first}
+    environment.reset(EpisodeSpec(seed=1, object=other))
+    twin = suite.load("single_object", "target_pose", seed=5, obs_mode="state", objects=objects)
+    twin.reset(EpisodeSpec(seed=2, object=first))
+    snapshot, action = save(twin), _actions(1, 0)[0]
+    restore(environment, snapshot)
+    assert _bits(environment, environment.step(action)) == _bits(twin, twin.step(action))
+
+
+def test_restoring_changes_no_later_episode():
+    options = {"obs_mode": "state", "objects": ["mug_000", "box_000"], "randomisation": "strong"}
+    spec = EpisodeSpec(seed=5, object="mug_000")
+    one, other = (suite.load("single_object", "target_pose", seed=0, **options) for _ in range(2))
+    one.reset(EpisodeSpec(seed=4, object="mug_000"))
+    snapshot = save(one)
+    other.reset(EpisodeSpec(seed=1, object="box_000"))
+    restore(other, snapshot)
+    one.reset(spec)
+    other.reset(spec)
+    np.testing.assert_array_equal(
+        one.physics.model.actuator_gainprm, other.physics.model.actuator_gainprm
+    )
+    np.testing.assert_array_equal(one.physics.model.body_mass, other.physics.model.body_mass)
+
+
+def test_a_restored_episode_has_its_own_failure_and_last_observation():
+    environment = _load(suite.ALL_TASKS[0], 5)
+    environment.reset()
+    snapshot = save(environment)
+    environment.reset()
+    environment.failure = environment.failure_reason = "physics"
+    restored = restore(environment, snapshot)
+    assert environment.failure == environment.failure_reason == ""
+    step = environment.step(None, observe=False)
+    for name, value in step.observation.items():
+        np.testing.assert_array_equal(value, restored[name])
+
+
+def test_after_a_reset_that_fails_the_next_step_begins_an_episode():
+    environment = suite.load("single_object", "reorient_mug", seed=3, obs_mode="state")
+    environment.reset()
+    with pytest.raises(InputError, match="goal"):
+        environment.reset(EpisodeSpec(goal=tuple(map(tuple, np.eye(4).tolist()))))
+    assert environment.step(_actions(1, 0)[0]).first()
