@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 _AT_MOST = 60  # names that an error spells out
 
@@ -62,3 +63,16 @@ class ServerLostError(WorkerDiedError):
 
     Nothing that was asked of it counts as its failure: the command line prints the message and exits with code 1.
     """
+
+
+@contextmanager
+def worker_deaths(kept: str) -> Iterator[None]:
+    """Inside, the death of one of joblib's worker processes is a `WorkerDiedError`; `kept`: what of the work is, where."""
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    try:
+        yield
+    except TerminatedWorkerError as error:
+        raise WorkerDiedError(
+            f"a worker process died ({' '.join(str(error).split())[:200]}); {kept}, and fewer --jobs if memory ran out"
+        ) from None

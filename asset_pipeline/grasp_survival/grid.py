@@ -37,7 +37,7 @@ class GridConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not self.frictions or min(self.frictions) <= 0:
+        if not self.frictions or not all(0 < f < np.inf for f in self.frictions):
             raise InputError(f"frictions are {self.frictions}; expected one or more above 0")
         if self.places < 1 or self.shift < 0 or self.turn < 0:
             raise InputError("places: expected 1 or more; shift and turn: 0 or more")

@@ -31,7 +31,8 @@ class Survival:
     Attributes:
       probability: Share of a grasp's trials in which it held; NaN where none counts.
       trials: How many of its trials count.
-      verdict: Whether it held with the pads' own friction, the hand at its place: what `build.grasp_trial` tries.
+      verdict: Whether it held with the greatest friction that was tried, the hand at its place; by default that is the
+        pads' own, and the verdict that of `build.grasp_trial`.
       engine: That made them.
     """
 

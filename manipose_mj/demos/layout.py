@@ -92,6 +92,7 @@ class DemoSet:
       protocol: Version and sha256 of the protocol whose seeds it must not hold.
       episodes: In the order of their ids.
       replayed: How many episodes of a recording it is a replay of; None: it is the recording.
+      assets_sha256: Of which builds of the user's assets it is; None: all are built in.
     """
 
     path: Path
@@ -101,6 +102,7 @@ class DemoSet:
     protocol: dict[str, str]
     episodes: tuple[DemoEpisode, ...]
     replayed: int | None = None
+    assets_sha256: str | None = None
 
     @property
     def document(self) -> dict[str, Any]:
@@ -117,6 +119,7 @@ class DemoSet:
             "versions": self.versions,
             "protocol": self.protocol,
             **({} if self.replayed is None else {"replayed": self.replayed}),
+            **({} if self.assets_sha256 is None else {"assets_sha256": self.assets_sha256}),
             "episodes": [asdict(episode) for episode in self.episodes],
         }
 
@@ -245,6 +248,7 @@ def read_set(path: Path) -> DemoSet:
             document["protocol"],
             episodes,
             document.get("replayed"),
+            document.get("assets_sha256"),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())

@@ -13,6 +13,11 @@ from manipose_mj.demos.layout import RECORDED_HZ, DemoEpisode, DemoSet, find_set
 from manipose_mj.errors import InputError
 from manipose_mj.policies.protocol import ActionSpace
 
+ABSOLUTE = (
+    "pd_joint_pos",
+    "pd_ee_pose",
+)  # control modes of which a later action replaces an earlier one
+
 
 class RecordedPolicy:
     """Answers with the recorded actions of the episode's seed, all at once."""
@@ -33,7 +38,7 @@ class RecordedPolicy:
         """Look the episode up.
 
         Raises:
-          InputError: It was not recorded, or in another control mode.
+          InputError: It was not recorded, or in another control mode, or its actions are changes at another rate.
         """
         if (task, seed) not in self._episodes:
             raise InputError(
@@ -44,6 +49,11 @@ class RecordedPolicy:
             raise InputError(
                 f"{demos.path}: its actions are {episode.control_mode}; "
                 f"add --control-mode {episode.control_mode}"
+            )
+        if episode.control_mode not in ABSOLUTE and action_space.hz != RECORDED_HZ:
+            raise InputError(
+                f"{demos.path}: its actions are changes ({episode.control_mode}), {RECORDED_HZ} a second; none can be "
+                f"left out: add --hz {RECORDED_HZ}"
             )
         self._actions = slowed(read_actions(demos, episode), action_space.hz)
 

@@ -23,8 +23,9 @@ from manipose_mj.demos.layout import (
     write_description,
     writing,
 )
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, worker_deaths
 from manipose_mj.evaluation.config import episode_seed
+from manipose_mj.evaluation.protocol.own_assets import built_assets, digest_of
 from manipose_mj.evaluation.records import write_atomically
 
 if TYPE_CHECKING:
@@ -88,6 +89,14 @@ class RecordConfig:
         return [str(Path(each).absolute()) if is_folder(each) else each for each in self.objects]
 
     @property
+    def assets_digest(self) -> str | None:
+        """Which builds of the user's assets episodes are of; None where all are built in."""
+        from manipose_mj.tasks.core.object_selection import is_folder
+
+        folders = [each for each in self.objects or () if is_folder(each)]
+        return digest_of(built_assets(folders)) if folders else None
+
+    @property
     def identity(self) -> dict[str, Any]:
         """What two runs must share for their attempts to belong together."""
         return {
@@ -95,6 +104,7 @@ class RecordConfig:
             "seed": self.seed,
             "failures": self.failures,
             "objects": self.stated_objects,
+            "assets sha256": self.assets_digest,
             "versions": current_versions(),
             "protocol": current_protocol(),
         }
@@ -142,7 +152,8 @@ def record(
     if config.path.exists():
         demos = _recorded(config, resume)
         if sum(each.success for each in demos.episodes) >= config.episodes:
-            shutil.rmtree(config.parts, ignore_errors=True)
+            if _holds_all(config, demos):
+                shutil.rmtree(config.parts, ignore_errors=True)
             return demos
         _claim(config, resume)
         planned = _taken_apart(config, demos, seeds)
@@ -169,6 +180,7 @@ def record(
 def _recorded(config: RecordConfig, resume: bool) -> DemoSet:
     """The set that is there already, if it is the beginning of what is asked for."""
     demos = read_set(config.path)
+    digest = config.assets_digest
     wins = sum(each.success for each in demos.episodes)
     if not resume:
         raise InputError(
@@ -176,6 +188,8 @@ def _recorded(config: RecordConfig, resume: bool) -> DemoSet:
         )
     if demos.env_kwargs["objects"] != config.stated_objects:
         raise InputError(f"{config.path}: its objects are others; choose another --out")
+    if demos.assets_sha256 != digest:
+        raise InputError(f"{config.path}: its objects were built otherwise; choose another --out")
     attempts = islice(config.seeds(), (_PATIENCE + 1) * (wins + 2))
     planned = {seed: number for number, seed in attempts}
     if not all(each.episode_seed in planned for each in demos.episodes):
@@ -194,6 +208,13 @@ def _recorded(config: RecordConfig, resume: bool) -> DemoSet:
     if config.failures and len(demos.episodes) < sum(n <= last for n in planned.values()):
         raise InputError(f"{config.path}: lacks its failures; leave out --failures for more")
     return demos
+
+
+def _holds_all(config: RecordConfig, demos: DemoSet) -> bool:
+    """Whether the set has all successes that attempts have left; a longer recording may have been cut short."""
+    kept = {each.episode_seed for each in demos.episodes}
+    left = [_outcome(config, int(file.stem)) for file in config.parts.glob("[0-9]*.json")]
+    return all(each.episode_seed in kept for each in left if each.success)
 
 
 def _taken_apart(
@@ -266,7 +287,8 @@ def _run(config: RecordConfig, missing: Sequence[tuple[int, int]]) -> Iterator[b
         options: Any = {"return_as": "generator_unordered", "batch_size": 1}
         pool: Any = joblib.Parallel(n_jobs=min(config.jobs, len(missing)), **options)
         outcomes = pool(joblib.delayed(_attempt)(config, *each) for each in missing)
-    yield from outcomes
+    with worker_deaths(f"finished attempts are kept in {config.parts}: repeat with --resume"):
+        yield from outcomes
 
 
 def _attempt(config: RecordConfig, number: int, seed: int) -> bool:
@@ -301,6 +323,7 @@ def _assembled(config: RecordConfig, ended: list[DemoEpisode]) -> DemoSet:
         identity["versions"],
         identity["protocol"],
         episodes,
+        assets_sha256=identity["assets sha256"],
     )
     # What a set held that was there before is among the attempts.
     config.path.unlink(missing_ok=True)

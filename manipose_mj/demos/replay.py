@@ -27,7 +27,7 @@ from manipose_mj.demos.layout import (
     write_episode,
     writing,
 )
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, worker_deaths
 from manipose_mj.storage.staging import clear_staging, staging
 
 if TYPE_CHECKING:
@@ -231,7 +231,8 @@ def _run(demos: DemoSet, config: ReplayConfig, parts: Path | None) -> Iterator[R
         pool: Any = joblib.Parallel(n_jobs=config.jobs, **options)
         calls = (joblib.delayed(replay_one)(demos, e, config, parts) for e in demos.episodes)
         outcomes = pool(calls)
-    yield from outcomes
+    with worker_deaths("nothing of this set is kept: repeat the command"):
+        yield from outcomes
 
 
 def replay_one(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from manipose_mj.console.cluster import cluster
 from manipose_mj.control.perception.source_names import GraspSource
-from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, WorkerDiedError
+from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, worker_deaths
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
@@ -241,7 +241,6 @@ def _outcomes(
             yield run_one(config, runner, task, episode)
         return
     import joblib
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     # One thread per worker: else every worker's BLAS takes all cores, and sums change their order.
     here: dict[str, Any] = {"backend": "loky", "inner_max_num_threads": 1}
@@ -251,13 +250,8 @@ def _outcomes(
         pool: Any = joblib.Parallel(n_jobs=min(config.jobs, len(episodes)), **options)
         wherever = _independent_of_folder(config)
         outcomes = pool(joblib.delayed(run_one)(wherever, runner, *key) for key in episodes)
-    try:
+    with worker_deaths(f"finished episodes are kept in {config.out}: repeat with --resume"):
         yield from outcomes
-    except TerminatedWorkerError as error:
-        raise WorkerDiedError(
-            f"a worker process died ({' '.join(str(error).split())[:200]}); finished episodes are "
-            f"kept in {config.out}: repeat with --resume, and fewer --jobs if memory ran out"
-        ) from None
 
 
 def _independent_of_folder(config: EvaluationConfig) -> EvaluationConfig:

@@ -144,7 +144,7 @@ def estimate_rows(
     Raises:
       InputError: One of the clouds cannot be used.
     """
-    if not clouds:
+    if len(clouds) == 0:
         return []
     upwards = np.asarray(up, np.float32)
     if upwards.shape != (3,) or not np.isfinite(upwards).all() or not upwards.any():

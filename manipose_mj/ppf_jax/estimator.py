@@ -76,6 +76,10 @@ class PoseEstimator:
         Raises:
           InputError: No such category or type; or there are no weights for it.
         """
+        if cameras not in ("one", "several"):
+            raise unknown_name("number of cameras", str(cameras), ("one", "several"))
+        if name in CATALOGUE and CATALOGUE[name].object_type == "articulated":
+            raise InputError(f"{name}: furniture has handles and joints; see FurnitureEstimator")
         if name not in CATALOGUE and name not in OBJECT_TYPES:
             raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
         stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
@@ -112,6 +116,8 @@ class PoseEstimator:
           InputError: The file is missing, truncated, of another version, or not what was asked for.
         """
         trained = load_weights(Path(path))
+        if trained.method == "articulated":
+            raise InputError(f"{path}: weights of furniture; ArticulatedEstimator reads them")
         if method is not None and trained.method != method:
             raise InputError(f"{path}: weights of method {trained.method}; expected {method}")
         if labels is not None and trained.labels != labels:
@@ -147,7 +153,7 @@ class PoseEstimator:
         Raises:
           InputError: One of the clouds cannot be used.
         """
-        if not clouds:
+        if len(clouds) == 0:
             return []
         checked = []
         for number, cloud in enumerate(clouds):

@@ -166,9 +166,15 @@ def fused_cloud(
         raise InputError(
             f"{len(clouds)} clouds and camera frames of shape {frames.shape}; expected a 4x4 frame each"
         )
+    for number, frame in enumerate(frames):
+        if not _is_rigid(frame):
+            raise InputError(f"camera frame {number} is no rigid transform")
     seen = []
     for cloud, frame in zip(clouds, frames, strict=True):
-        if len(cloud if isinstance(cloud, np.ndarray) else cloud.points) < MIN_VIEW_POINTS:
+        points = np.asarray(getattr(cloud, "points", cloud), float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"a cloud has shape {points.shape}; expected (n, 3)")
+        if len(points) < MIN_VIEW_POINTS:
             continue
         points, normals = checked_cloud(
             cloud, fewest=MIN_VIEW_POINTS, shortest=0.0, longest=LONGEST, what="an object"
@@ -201,3 +207,10 @@ def _towards(
 
 def _moved(estimate: PoseEstimate, T_common_camera: Float[np.ndarray, "4 4"]) -> PoseEstimate:
     return replace(estimate, pose=T_common_camera @ estimate.pose.astype(float), hypotheses=())
+
+
+def _is_rigid(frame: Float[np.ndarray, "4 4"]) -> bool:
+    rotation = frame[:3, :3]
+    if not np.isfinite(frame).all() or (frame[3] != (0, 0, 0, 1)).any():
+        return False
+    return np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) and np.linalg.det(rotation) > 0

@@ -85,7 +85,7 @@ def load_weights(path: Path) -> TrainedModel:
             arrays = [stored[name] for name in sorted(stored.files) if name != _HEADER]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file of weights") from None
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, zlib.error):
+    except (OSError, EOFError, LookupError, TypeError, ValueError, zipfile.BadZipFile, zlib.error):
         raise InputError(
             f"{path}: not a whole file of weights; copy it again or train again"
         ) from None

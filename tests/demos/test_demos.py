@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -20,12 +21,13 @@ from manipose_mj.cli.main import main
 from manipose_mj.demos import record as recording
 from manipose_mj.demos.layout import frozen_seeds, read_actions, read_set, refuse_frozen
 from manipose_mj.demos.lerobot_export import ExportConfig, export
-from manipose_mj.demos.playback import slowed
+from manipose_mj.demos.playback import RecordedPolicy, slowed
 from manipose_mj.demos.record import record
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
+from manipose_mj.policies.protocol import ActionSpace
 from tests.demos.recordings import OBJECTS, TASK, config
 from tests.places import ROOT
 
@@ -217,7 +219,9 @@ def test_a_set_is_extended(tmp_path, monkeypatch):
     asked = config(tmp_path / "grown", episodes=5)
     with pytest.raises(KeyboardInterrupt):
         record(asked, resume=True)
-    assert len(read_set(asked.path).episodes) == 2  # nothing is lost
+    assert len(read_set(asked.path).episodes) == 2  # nothing is lost, also not by asking for fewer
+    record(config(tmp_path / "grown", episodes=2), resume=True)
+    assert (asked.parts / "00004.json").is_file()
     assert record(asked, resume=True).episodes == whole.episodes
     assert calls == [3, 4, 5, 6, 6] and not asked.parts.exists()
     assert asked.path.read_bytes() == whole.path.read_bytes()
@@ -240,6 +244,31 @@ def test_a_set_is_extended_by_what_it_holds_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "current_versions", lambda: {"mujoco": "0.1"})
     with pytest.raises(InputError, match="this run has {'mujoco': '0.1'}; choose another --out"):
         record(config(tmp_path / "successes", **more), resume=True)
+
+
+def test_a_set_of_other_builds_is_not_extended(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", _attempting)
+    asset = tmp_path / "assets" / "mug" / "asset.json"
+    asset.parent.mkdir(parents=True)
+    asset.write_text('{"schema_version": 1, "name": "mug", "provenance": {"generator": "one"}}')
+    objects = {"objects": (str(tmp_path / "assets"),)}
+    record(config(tmp_path / "out", episodes=1, **objects))
+    assert len(record(config(tmp_path / "out", episodes=2, **objects), resume=True).episodes) == 2
+    asset.write_text('{"schema_version": 1, "name": "mug", "provenance": {"generator": "two"}}')
+    with pytest.raises(InputError, match="its objects were built otherwise"):
+        record(config(tmp_path / "out", episodes=3, **objects), resume=True)
+
+
+def test_changes_of_targets_are_played_at_their_rate_only(copied):
+    description = copied.with_suffix(".json")
+    description.write_text(description.read_text().replace("pd_joint_pos", "pd_ee_delta_pose"))
+    policy, (episode, *_) = RecordedPolicy(str(copied)), read_set(copied).episodes
+    space = ActionSpace(-np.ones(7), np.ones(7), "pd_ee_delta_pose", 10.0)
+    told = {"task": TASK, "instruction": "", "seed": episode.episode_seed}
+    with pytest.raises(InputError, match="none can be left out: add --hz 50"):
+        policy.reset(**told, action_space=space)
+    policy.reset(**told, action_space=replace(space, hz=50.0))
+    assert len(policy.infer({})["actions"]) == episode.elapsed_steps
 
 
 def test_recordings_name_folders_of_objects_by_their_whole_path(tmp_path, monkeypatch):

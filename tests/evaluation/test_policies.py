@@ -23,9 +23,7 @@ from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.evaluation.cards.method import method_of, method_text, sources_of
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.episode import (
-    Naming,
     environment_of,
-    play,
     run_episode,
     run_policy_episode,
 )
@@ -33,9 +31,7 @@ from manipose_mj.evaluation.policy_settings import Attachment, PolicySettings, a
 from manipose_mj.evaluation.protocol import load as load_protocol
 from manipose_mj.evaluation.records import read_results
 from manipose_mj.evaluation.results_folder import RUN_FILE, SUMMARY_FILE
-from manipose_mj.evaluation.rollout import Rules
 from manipose_mj.evaluation.runner import PolicyRunner, evaluate, run_one
-from manipose_mj.failures import StageFailure
 from manipose_mj.policies.baseline import BaselinePolicy
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -302,30 +298,6 @@ def test_resume_refuses_what_a_server_with_other_metadata_left(tmp_path, monkeyp
     evaluate(evaluation(tmp_path / "new", REACHING, episodes=1))
     said = json.loads((tmp_path / "new" / RUN_FILE).read_text())["policy metadata"]
     assert said == {"checkpoint": "b", "seen": "inf"}
-
-
-def test_a_droid_policy_is_told_of_droids_gripper():
-    told = []
-
-    class Hearing(Reaching):
-        def reset(self, **episode):
-            told.append(episode["action_space"])
-            raise StageFailure("plan", "heard")
-
-    settings = PolicySettings("a.b:C", obs_mode="state+rgb", obs_format="droid")
-    environment = environment_of(env_config())
-    naming = Naming(TASK, 0, "none", "none")
-    play(
-        environment,
-        Hearing(),
-        EpisodeSpec(1),
-        Rules(),
-        naming,
-        replace(settings, obs_format="manipose"),
-    )
-    play(environment, Hearing(), EpisodeSpec(1), Rules(), naming, settings)
-    assert told[0].high[-1] == pytest.approx(0.08) and told[1].high[-1] == 1
-    assert told[1].low[-1] == 0 and (told[0].high[:-1] == told[1].high[:-1]).all()
 
 
 def test_the_command_repeats_the_evaluation(tmp_path):

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from manipose_mj import suite
+from manipose_mj.evaluation.episode import Naming, environment_of, play
+from manipose_mj.evaluation.policy_settings import PolicySettings
+from manipose_mj.evaluation.rollout import Rules
+from manipose_mj.failures import StageFailure
 from manipose_mj.gym.droid import droid_observation, from_droid
 from manipose_mj.gym.features import AGENT_NAMES, Features, feature_sensors, pose_columns
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
-from manipose_mj.tasks.core.config import EpisodeSpec
+from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.goals import InsideGoal, OpenGoal, PoseGoal, ShutGoal, TakenOutGoal
 from tests.few_objects import load
 
@@ -105,3 +111,29 @@ def test_droids_gripper_is_shut_at_one():
 def test_sensors_follow_from_the_mode(mode, cameras, height):
     sensors = feature_sensors(mode)
     assert (sensors.camera_names, sensors.height) == (cameras, height)
+
+
+def test_a_droid_policy_is_told_of_droids_gripper():
+    told: list[ActionSpace] = []
+
+    class Hearing:
+        def reset(self, **episode):
+            told.append(episode["action_space"])
+            raise StageFailure("plan", "heard")
+
+        def infer(self, obs): ...
+
+    settings = PolicySettings("a.b:C", obs_mode="state+rgb", obs_format="droid")
+    environment = environment_of(EnvConfig(TASKS[0], obs_mode="state", objects=("mug_000",)))
+    naming = Naming(TASKS[0], 0, "none", "none")
+    play(
+        environment,
+        Hearing(),
+        EpisodeSpec(1),
+        Rules(),
+        naming,
+        replace(settings, obs_format="manipose"),
+    )
+    play(environment, Hearing(), EpisodeSpec(1), Rules(), naming, settings)
+    assert told[0].high[-1] == pytest.approx(0.08) and told[1].high[-1] == 1
+    assert told[1].low[-1] == 0 and (told[0].high[:-1] == told[1].high[:-1]).all()

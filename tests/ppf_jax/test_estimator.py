@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -149,6 +150,22 @@ def test_names_without_weights(monkeypatch, tmp_path):
         PoseEstimator.load("mgu")
     with pytest.raises(InputError, match="no weights for mug .*manipose pose train mug"):
         PoseEstimator.load("mug")
+    with pytest.raises(InputError, match="unknown number of cameras 'multi'"):
+        PoseEstimator.load("mug", cameras="multi")
+    with pytest.raises(InputError, match="cabinet: furniture has handles and joints"):
+        PoseEstimator.load("cabinet")
+
+
+def test_weights_of_furniture_are_another_estimators():
+    path = Path(module.__file__).parent / "weights" / "furniture.npz"
+    with pytest.raises(InputError, match="weights of furniture; ArticulatedEstimator reads them"):
+        PoseEstimator.from_file(path)
+
+
+def test_an_array_that_is_no_file_of_weights_is_named(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros(3))
+    with pytest.raises(InputError, match="a.npy: not a whole file of weights"):
+        load_weights(tmp_path / "a.npy")
 
 
 def test_a_category_without_weights_gets_its_types(trained, monkeypatch, tmp_path):

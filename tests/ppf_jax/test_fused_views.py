@@ -81,6 +81,11 @@ def test_what_cannot_be_fused_is_told(views, frames):
         estimator.estimate_views([view.points[:7] for view in views], frames, key=KEY)
     with pytest.raises(InputError, match="cloud of 30 points; expected at least 32"):
         estimator.estimate_views([view.points[:10] for view in views], frames, key=KEY)
+    for value, row in ((np.nan, 0), (0.1, 0), (0.1, 3)):
+        wrong = np.array(frames)
+        wrong[1, row, 0] += value
+        with pytest.raises(InputError, match="camera frame 1 is no rigid transform"):
+            estimator.estimate_views(views, wrong, key=KEY)
     with pytest.raises(InputError, match="learnt from one camera"):
         FusedViewEstimator(PoseEstimator.load("cup")).estimate_views(views, frames, key=KEY)
 

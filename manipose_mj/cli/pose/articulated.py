@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from manipose_mj.cli.pose.train import CURVE_PICTURE, WEIGHTS_FILE, require_positive
+from manipose_mj.cli.pose.train import CURVE_PICTURE, WEIGHTS_FILE, file_digest, require_positive
 from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
@@ -58,9 +58,12 @@ def train_articulated(
     for name, count in (("further", further), ("synthetic", synthetic)):
         if count < 0:
             raise InputError(f"--{name} is {count}; expected 0 or more")
+    if seed < 0:
+        raise InputError(f"--seed is {seed}; expected 0 or more")
     import jax
 
     from manipose_mj.console import output
+    from manipose_mj.evaluation.protocol.own_assets import built_assets, digest_of
     from manipose_mj.ppf_jax.articulated.model import ArticulatedConfig, ArticulatedModel
     from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes as scenes_of_assets
     from manipose_mj.ppf_jax.data.articulated.cache import (
@@ -77,6 +80,7 @@ def train_articulated(
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, TrainingConfig, train
     from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
 
+    initial = None if start_from is None else load_weights(start_from).model
     objects = furniture_names("train", further, synthetic)
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(
@@ -112,7 +116,17 @@ def train_articulated(
             TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss()),  # pyright: ignore[reportArgumentType]
             out,
             build=ArticulatedModel,
-            initial=None if start_from is None else load_weights(start_from).model,
+            initial=initial,
+            about={
+                "--scenes": scenes,
+                "--further": further,
+                "--synthetic": synthetic,
+                "--assets": None if assets is None else digest_of(built_assets([assets])),
+                "--only": sorted(only),
+                "--asset-scenes": asset_scenes,
+                "--batch": batch,
+                "--start-from": file_digest(start_from),
+            },
             minutes=minutes,
             progress=show,
         )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from manipose_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from manipose_mj.ppf_jax.weight_files import TrainedModel
 
 Files = Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE FILE...")]
 
@@ -32,14 +35,10 @@ def average_weights(
 
     first, *others = (load_weights(path) for path in files)
     for path, other in zip(files[1:], others, strict=True):
-        if (other.method, other.categories, other.labels) != (
-            first.method,
-            first.categories,
-            first.labels,
-        ):
+        if _kind(other) != _kind(first):
             raise InputError(
-                f"{path}: weights of {other.method}, {', '.join(other.categories)}, {other.labels} labels; "
-                f"expected {first.method}, {', '.join(first.categories)}, {first.labels} as {files[0]} has"
+                f"{path}: weights of {', '.join(_kind(other))}; expected {', '.join(_kind(first))} as "
+                f"{files[0]} has"
             )
     try:
         model = mean_weights([first.model, *(other.model for other in others)])
@@ -47,3 +46,9 @@ def average_weights(
         raise InputError(f"{', '.join(map(str, files))}: {error}") from None
     save_weights(out, replace(first, model=model))
     return 0
+
+
+def _kind(trained: TrainedModel) -> tuple[str, ...]:
+    """What weights must share to be averaged, in words."""
+    categories = ", ".join(trained.categories)
+    return trained.method, categories, f"{trained.labels} labels", f"{trained.cameras} camera"

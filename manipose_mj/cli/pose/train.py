@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -78,10 +79,13 @@ def train_pose(
     for option, count in (("part-swaps", part_swaps), ("asset-part-swaps", asset_part_swaps)):
         if count < 0:
             raise InputError(f"--{option} is {count}; expected 0 or more")
+    if seed < 0:
+        raise InputError(f"--seed is {seed}; expected 0 or more")
     if not setting:
         raise InputError("--setting names none; expected at least one, such as training")
     from manipose_mj.cli.pose.clouds import PoseClouds
     from manipose_mj.console import output
+    from manipose_mj.evaluation.protocol.own_assets import built_assets, digest_of
     from manipose_mj.ppf_jax.data.view_cache import batch_stream
     from manipose_mj.ppf_jax.data.view_settings import view_setting
     from manipose_mj.ppf_jax.points.symmetry import common_symmetry
@@ -90,6 +94,7 @@ def train_pose(
     from manipose_mj.ppf_jax.training.methods import METHODS
     from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
 
+    initial = None if start_from is None else load_weights(start_from).model
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
     several = any(view_setting(each).cameras != (1, 1) for each in setting)
     made_of_two = source.part_swapped(part_swaps, SEVERAL if several else "training")
@@ -125,7 +130,21 @@ def train_pose(
             replace(chosen.training, steps=steps, seed=seed),
             folder,
             build=chosen.build,
-            initial=None if start_from is None else load_weights(start_from).model,
+            initial=initial,
+            about={
+                "name": name,
+                "--leave-out": sorted(leave_out),
+                "--labels": labels,
+                "--setting": setting,
+                "--views": views,
+                "--part-swaps": part_swaps,
+                "--assets": digest_of(built_assets(assets)),
+                "--asset-views": asset_views,
+                "--asset-part-swaps": asset_part_swaps,
+                "--scan-views": [str(folder.absolute()) for folder in scan_views],
+                "--batch": batch,
+                "--start-from": file_digest(start_from),
+            },
             held_out=[next(stream) for _ in range(checks)],
             minutes=minutes,
             progress=show,
@@ -148,6 +167,11 @@ def folder_name(name: str, method: str, labels: str) -> str:
     parts += [method] if method != "ours" else []
     parts += [labels] if labels != "unified" else []
     return "-".join(parts)
+
+
+def file_digest(path: Path | None) -> str | None:
+    """The sha256 of a file; None of none."""
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def require_positive(minutes: float | None, **counts: int) -> None:

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -89,6 +89,7 @@ def train(
     *,
     build: Callable[..., Any] = PoseModel,
     initial: Any = None,
+    about: Mapping[str, Any] | None = None,
     held_out: Sequence[CloudBatch] = (),
     minutes: float | None = None,
     progress: Callable[[Row], None] | None = None,
@@ -105,6 +106,7 @@ def train(
       folder: Where the state and the curve are kept.
       build: Makes the model from `model_config` and `rng`, its random numbers.
       initial: A model of the same sizes, whose weights to start from instead of random ones.
+      about: What batches and `initial` are, as JSON: a state of others is not gone on from.
       held_out: Batches to measure on, of one shape.
       minutes: Ends the training, cooled down, if the steps do not.
       progress: Told every row of the curve.
@@ -116,7 +118,8 @@ def train(
     model = build(model_config, rng=np.random.default_rng(config.seed))
     if initial is not None:
         model = with_weights_of(model, initial)
-    state, curve = _resumed(folder, model, config)
+    stated = json.loads(json.dumps(about or {}))
+    state, curve = _resumed(folder, model, config, stated)
     start = int(state.step)
     began = saved = time.monotonic()
     earlier = float(curve[-1]["seconds"]) if curve else 0.0
@@ -142,9 +145,9 @@ def train(
             if progress is not None:
                 progress(row)
         if time.monotonic() - saved > config.save_every:
-            _save(folder, state, curve, config)
+            _save(folder, state, curve, config, stated)
             saved = time.monotonic()
-    _save(folder, state, curve, config)
+    _save(folder, state, curve, config, stated)
     return state.model
 
 
@@ -288,7 +291,9 @@ def _fresh(model: Any, config: TrainingConfig) -> TrainingState:
     return TrainingState(model, optimizer, jnp.zeros((), jnp.int32))
 
 
-def _resumed(folder: Path, model: Any, config: TrainingConfig) -> tuple[TrainingState, list[Row]]:
+def _resumed(
+    folder: Path, model: Any, config: TrainingConfig, about: dict[str, Any]
+) -> tuple[TrainingState, list[Row]]:
     fresh = _fresh(model, config)
     path = folder / STATE_FILE
     if not path.is_file():
@@ -299,6 +304,12 @@ def _resumed(folder: Path, model: Any, config: TrainingConfig) -> tuple[Training
             if header["config"] != _described(fresh.model.config, config):
                 raise InputError(
                     f"{path}: the state of a training with another configuration; give another folder"
+                )
+            before = header["about"]
+            others = [name for name in {**before, **about} if before.get(name) != about.get(name)]
+            if others:
+                raise InputError(
+                    f"{path}: the state of a training with other {', '.join(sorted(others))}; give another folder"
                 )
             return eqx.tree_deserialise_leaves(file, fresh), header["curve"]
     except InputError:
@@ -313,9 +324,19 @@ def _described(model_config: Any, config: TrainingConfig) -> Any:
     return json.loads(json.dumps(parts))
 
 
-def _save(folder: Path, state: TrainingState, curve: list[Row], config: TrainingConfig) -> None:
+def _save(
+    folder: Path,
+    state: TrainingState,
+    curve: list[Row],
+    config: TrainingConfig,
+    about: dict[str, Any],
+) -> None:
     """The state with its curve in one file, so that they cannot disagree; the curve beside it."""
-    header = {"config": _described(state.model.config, config), "curve": curve}
+    header = {
+        "config": _described(state.model.config, config),
+        "about": about,
+        "curve": curve,
+    }
     with replacing(folder / STATE_FILE) as scratch, open(scratch, "wb") as file:
         file.write(json.dumps(header).encode() + b"\n")
         eqx.tree_serialise_leaves(file, state)

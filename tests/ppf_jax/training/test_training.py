@@ -120,6 +120,8 @@ def test_a_broken_training_goes_on_as_if_it_had_not(bowls, model_config, whole, 
     other_seed = dataclasses.replace(CONFIG, seed=5)
     with pytest.raises(InputError, match="another configuration; give another folder"):
         train(_batches(bowls), model_config, other_seed, tmp_path)
+    with pytest.raises(InputError, match="training with other --views; give another folder"):
+        train(_batches(bowls), model_config, CONFIG, tmp_path, about={"--views": 8})
     state = (tmp_path / STATE_FILE).read_bytes()
     (tmp_path / STATE_FILE).write_bytes(state[: len(state) // 2])
     with pytest.raises(InputError, match="not a whole training state"):
