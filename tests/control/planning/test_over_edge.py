@@ -81,6 +81,7 @@ def test_a_hand_from_below_points_up_beyond_the_edge() -> None:
     assert not from_below(compose(np.diag([1.0, -1.0, -1.0]), beyond))
 
 
+@pytest.mark.full
 def test_a_plate_is_turned_upside_down(plate: Asset) -> None:
     task = "single_object/orientation"
     config = EnvConfig(task, obs_mode="state", objects=(str(plate.folder),))
