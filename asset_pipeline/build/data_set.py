@@ -215,6 +215,10 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
             provenance=draft.provenance,
             label_quality=draft.label_quality,
         )
+    if not asset.graspable:
+        log.warning(
+            "%s: the gripper can hold it nowhere; tasks that have it moved refuse it", scan.name
+        )
     if override is not None:
         centred = replace(measured.label, center=box_center(body, measured.label))
         write_measured(folder, replace(measured, label=centred))

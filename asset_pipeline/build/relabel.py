@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import cast
 from xml.etree import ElementTree
@@ -40,11 +41,15 @@ def relabel(path: Path, labels: Path) -> list[Asset]:
 
     Raises:
       InputError: A folder or the file cannot be read, an entry cannot be applied, or, for a whole
-        folder, an entry is of an object that is not there.
+        folder, an entry is of an object that is not there; or, for an asset without one, of a name much like its own.
     """
     overrides = read_overrides(labels)
     if (path / ASSET_FILE).is_file():
         folders: Sequence[Path] = [path]
+        own = read_asset(path).name
+        near = [] if own in overrides else get_close_matches(own, overrides, 1)
+        if near:
+            raise InputError(f"{labels}: {unknown_name('object', near[0], [own])}")
     else:
         folders = list_assets(path)
         there = {read_asset(folder).name for folder in folders}

@@ -53,7 +53,7 @@ def check_assets(
             _number(result.tilt, math.degrees(1), 1),
             str(result.parts),
             str(result.grasps),
-            "ok" if result.ok else "failed",
+            _verdict(result),
         )
     console = output.standard_output()
     if len(unreadable) < len(results):
@@ -63,6 +63,13 @@ def check_assets(
         for reason in (unreadable[result.name],) if result.name in unreadable else result.failures:
             output.fail_line(reason if result.name in reason else f"{result.name}: {reason}")
     return 2 if unreadable else int(not all(r.ok for r in results))
+
+
+def _verdict(result) -> str:
+    if not result.ok:
+        return "failed"
+    articulated = math.isnan(result.tilt)
+    return "ok" if result.grasps or articulated else "ok, no grasps"
 
 
 def _unreadable(directory: Path, result) -> str:

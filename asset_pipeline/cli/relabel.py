@@ -22,12 +22,14 @@ def relabel_assets(
       path: An asset's folder, or a folder of assets.
       labels: YAML file of entries by object name; docs/guides/label_corrections.md shows one.
     """
-    from asset_pipeline.build.relabel import relabel
+    from asset_pipeline.build.relabel import OVERRIDE, relabel
     from manipose_mj.console import output
 
     changed = relabel(path, labels)
     console = output.standard_output()
     for asset in changed:
-        console.print(f"{asset.name}: relabelled")
+        said = OVERRIDE in asset.provenance.inputs
+        done = "relabelled" if said else f"no entry in {labels}; labelled as measured"
+        console.print(f"{asset.name}: {done}", soft_wrap=True)
     if not changed:
         console.print(f"{path}: labelled as {labels} says already", soft_wrap=True)

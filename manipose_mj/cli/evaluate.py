@@ -113,13 +113,14 @@ def evaluate(
     from manipose_mj.estimators.loading import load_estimator
     from manipose_mj.estimators.settings import chosen_estimator
     from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
-    from manipose_mj.evaluation.planner_settings import PlannerSettings
+    from manipose_mj.evaluation.planner_settings import EXCHANGES, PlannerSettings
     from manipose_mj.evaluation.policy_settings import PolicySettings
     from manipose_mj.evaluation.protocol.frozen import EPISODES
     from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
     from manipose_mj.tasks.core.registry import tasks_named
 
     tasks = tasks_named(tasks)
+    check_names(tasks, objects)
     if out is None:
         if resume:
             raise InputError("--resume needs --out: the folder whose evaluation goes on")
@@ -143,7 +144,7 @@ def evaluate(
         raise InputError("--worlds needs --engine: c or warp")
     batch = None if engine is None else BatchSettings(engine, 256 if worlds is None else worlds)
     settings = None if policy == BASELINE else PolicySettings(policy, **given)
-    record = out / "exchanges" if planner == "llm" else None
+    record = out / EXCHANGES if planner == "llm" else None
     planning = PlannerSettings(planner, model, base_url, replay, instruction, record)
     config = EvaluationConfig(
         tasks,
@@ -198,25 +199,27 @@ def run_and_report(config, *, resume: bool) -> int:
         report = write_report(config.out, jobs=config.jobs)
     console = output.standard_output()
     console.print(output.summary_table(summarize(results)))
-    for line in policy_mistakes(results, config.out):
+    for line in common_reasons(results, config.out):
         console.print(line, soft_wrap=True)
     console.print(f"report: {report}", soft_wrap=True)
     return 0
 
 
-def policy_mistakes(results: Sequence[EpisodeResult], out: Path) -> list[str]:
-    """A line for each of the three commonest reasons why episodes failed in the policy, with the first's traceback."""
+def common_reasons(results: Sequence[EpisodeResult], out: Path) -> list[str]:
+    """A line for each of the three commonest reasons why episodes failed, the policy's own first, with its traceback."""
     from manipose_mj.evaluation.records import trajectory_path
 
-    failed: dict[str, list[EpisodeResult]] = {}
+    failed: dict[tuple[str, str], list[EpisodeResult]] = {}
     for result in results:
-        if result.failure == "policy":
-            failed.setdefault(result.reason, []).append(result)
+        if result.failure is not None and result.reason:
+            failed.setdefault((result.failure, result.reason), []).append(result)
+    ranked = sorted(failed.items(), key=lambda each: (each[0][0] != "policy", -len(each[1])))
     lines = []
-    for reason, those in sorted(failed.items(), key=lambda each: -len(each[1]))[:3]:
+    for (stage, reason), those in ranked[:3]:
         path = trajectory_path(out, those[0].task, those[0].episode).with_suffix(".error.txt")
         see = f"; see {path}" if path.exists() else ""
-        lines.append(f"failed in the policy, {len(those)} of {len(results)}: {reason}{see}")
+        what = "the policy" if stage == "policy" else stage
+        lines.append(f"failed in {what}, {len(those)} of {len(results)}: {reason}{see}")
     return lines
 
 
@@ -234,6 +237,9 @@ def check_names(tasks: tuple[str, ...], objects: tuple[str, ...]) -> list[str]:
     from manipose_mj.tasks.core.object_selection import asset_folders, is_folder
 
     known = ["/".join(task) for task in ALL_TASKS]
+    for name in objects:
+        if name in known:
+            raise InputError(f"--objects names {name}, a task; write tasks before options")
     for task in tasks:
         if task not in known:
             raise unknown_name("task", task, known)

@@ -45,8 +45,18 @@ def checked_answer(answer: Any, mesh: Mapping[str, np.ndarray] | None = None) ->
     if not isinstance(others, list | tuple):
         raise EstimatorFailedError(f"hypotheses are a {type(others).__name__}; expected a list")
     first = _estimate(answer, mesh)
-    rest = tuple(_estimate(each, mesh) for each in others)
+    rest = tuple(_other(number, each, mesh) for number, each in enumerate(others))
     return PoseEstimate(first.pose, first.extents, first.confidence, rest)
+
+
+def _other(number: int, answer: Any, mesh: Mapping[str, np.ndarray] | None) -> PoseEstimate:
+    if not isinstance(answer, Mapping):
+        kind = type(answer).__name__
+        raise EstimatorFailedError(f"hypothesis {number} is a {kind}; expected a dictionary")
+    try:
+        return _estimate(answer, mesh)
+    except EstimatorFailedError as error:
+        raise EstimatorFailedError(f"hypothesis {number}: {error}") from None
 
 
 def _told(estimate: PoseEstimate) -> dict[str, Any]:

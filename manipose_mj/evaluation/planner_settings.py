@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from manipose_mj.control.language.exchanges import ChatModel
     from manipose_mj.control.planning.planner import TaskPlanner
 
+EXCHANGES = "exchanges"  # folder of them in an evaluation's
 PlannerKind = Literal["rules", "llm", "replay"]
 
 
@@ -60,6 +61,8 @@ class PlannerSettings:
                 raise InputError(f"{name}: {text!r}; expected words")
         if self.replay is not None and not self.replay.exists():
             raise InputError(f"{self.replay}: no such file or folder of recorded exchanges")
+        if self.replay is not None and (self.replay / EXCHANGES).is_dir():  # an evaluation's folder
+            object.__setattr__(self, "replay", self.replay / EXCHANGES)
 
     def make(self) -> TaskPlanner:
         """The planner.

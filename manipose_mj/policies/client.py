@@ -11,6 +11,7 @@ All three send a dictionary of metadata first and answer packed observations wit
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Mapping
 from typing import Any, Literal, NoReturn
 
@@ -35,6 +36,7 @@ class RemotePolicy:
     def __init__(self, address: str) -> None:
         self.address = address
         self._client = Client(address, "policy server")
+        atexit.register(self.close)
         self._session = np.zeros(1, np.int32)
 
     @property

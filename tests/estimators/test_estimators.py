@@ -134,7 +134,11 @@ def test_options_that_do_not_go_together(words, message, capsys):
         ({"pose": IDENTITY, "score": np.nan}, "score is not finite"),
         ({"pose": IDENTITY, "score": 1, "extents": [1, 0, 1]}, "extents are not positive"),
         ({"pose": IDENTITY, "score": 1, "hypotheses": 3}, "hypotheses are a int"),
-        ({"pose": IDENTITY, "score": 1, "hypotheses": [{}]}, "answer has no 'pose'"),
+        ({"pose": IDENTITY, "score": 1, "hypotheses": [{}]}, "hypothesis 0: answer has no 'pose'"),
+        (
+            {"pose": IDENTITY, "score": 1, "hypotheses": [IDENTITY]},
+            "hypothesis 0 is a list; expected a dictionary",
+        ),
     ],
 )
 def test_what_is_no_answer_is_said(answer, message):

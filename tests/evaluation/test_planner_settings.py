@@ -44,6 +44,11 @@ def test_results_of_two_endpoints_do_not_belong_together():
     assert one.identity != other.identity and "key" not in str(one.identity)
 
 
+def test_the_folder_of_an_evaluation_holds_its_exchanges(tmp_path):
+    (tmp_path / "exchanges").mkdir()
+    assert PlannerSettings("replay", replay=tmp_path).replay == tmp_path / "exchanges"
+
+
 def test_words_hold_no_secrets():
     words = PlannerSettings("llm", "m", "http://me:pw@host:1/v1?api-key=s").words
     assert words[words.index("--base-url") + 1] == "http://host:1/v1"

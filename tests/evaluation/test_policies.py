@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from websockets.sync.server import serve as websocket_server
 
-from manipose_mj.cli.evaluate import policy_mistakes
+from manipose_mj.cli.evaluate import common_reasons
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError, ServerLostError
 from manipose_mj.evaluation.cards.method import method_of, method_text, sources_of
@@ -176,8 +176,11 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     assert results[0].failure == "policy" and "KeyError: 'weights'" in results[0].reason
     (note,) = tmp_path.rglob("*.error.txt")
     assert "own_policies.py" in note.read_text()
-    (line,) = policy_mistakes(results, tmp_path)
+    (line,) = common_reasons(results, tmp_path)
     assert line == f"failed in the policy, 1 of 1: {results[0].reason}; see {note}"
+    others = [replace(results[0], episode=i, failure="plan", reason="no way") for i in (1, 2)]
+    lines = common_reasons([*others, *results], tmp_path)
+    assert lines == [line.replace("1 of 1", "1 of 3"), "failed in plan, 2 of 3: no way"]
 
 
 @pytest.mark.full
@@ -345,6 +348,7 @@ POLICY = f"evaluate {TASK} --jobs 1 --out {{tmp}}/out --policy {HERE}:Reaching"
         (f'{POLICY} --policy-args {{{{"a":NaN}}}}', "NaN is no finite number"),
         (f"{POLICY} --resample 3", "there is no protocol whose seeds it replaces"),
         (f"evaluate {TASK} --hz 5", "hz: for a policy only"),
+        (f"evaluate --objects mug_000 {TASK}", "write tasks before options"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(argv, said, tmp_path, capsys):

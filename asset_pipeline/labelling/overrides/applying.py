@@ -17,6 +17,9 @@ from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
+_FARTHEST = 3  # from the middle of an object its label's origin can be, in lengths of its diagonal
+_DENSEST = 22_600.0  # of all matter: osmium [kg/m^3]
+
 
 def overridden(
     asset: Asset, override: Override, surface: trimesh.Trimesh, *, textured: bool
@@ -51,6 +54,7 @@ def overridden(
     up = asset.up if override.up is None else override.up
     found, quality = _measured(asset, override, surface, category, up, textured)
     label = moved(found, override.frame)
+    _check_units(override, label, surface)
     if label is not found:
         quality = None  # a person's word
     if label is not asset.label:
@@ -67,6 +71,21 @@ def overridden(
         parts=tuple(_part(override, part) for part in asset.parts),
         areas=tuple(_area(area, asset.label, label) for area in asset.areas),
     )
+
+
+def _check_units(override: Override, label: PoseLabel, surface: trimesh.Trimesh) -> None:
+    """Raise `InputError` for millimetres and grams."""
+    low, high = surface.bounds
+    size = float(np.linalg.norm(high - low))
+    away = float(np.linalg.norm(label.origin - (low + high) / 2))
+    if away > _FARTHEST * size:
+        raise InputError(
+            f"{override.where}: the origin is {away:.3g} m from the middle of an object of {size:.3g} m; expected metres"
+        )
+    if override.mass is not None and override.mass > _DENSEST * float(surface.convex_hull.volume):
+        raise InputError(
+            f"{override.where}: mass {override.mass:g} kg is more than osmium of that size weighs; expected kilograms"
+        )
 
 
 def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:

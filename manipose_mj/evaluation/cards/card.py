@@ -146,8 +146,12 @@ def _card(about: About, where: Sequence[str], records: Sequence[RunRecord]) -> d
     if not runs:
         raise InputError("a card is of at least one run")
     methods = [method_of(record.run) for record in records]
-    if any(method != methods[0] for method in methods):
-        raise InputError("the runs are of different methods; a card is of one")
+    for method in methods[1:]:
+        others = [n for n in {**methods[0], **method} if method.get(n) != methods[0].get(n)]
+        if others:
+            raise InputError(
+                f"the runs are of different methods ({', '.join(others)} differ); a card is of one"
+            )
     hashes = [record.sha256 for record in records]
     if len(set(hashes)) < len(hashes):
         raise InputError("two of the runs are the same")

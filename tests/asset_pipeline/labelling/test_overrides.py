@@ -22,6 +22,7 @@ from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.assets.label_marks import area_boxes
 from manipose_mj.assets.symmetry_names import SYMMETRIES, symmetry_name
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_error, rotation_about, rotation_angle, transform
 from tests.places import ROOT
@@ -231,6 +232,30 @@ def test_relabelling_changes_only_what_was_said_and_can_be_taken_back(tmp_path):
     relabel(asset.folder, _file(tmp_path, "{}\n"))
     assert {p.name: p.read_bytes() for p in asset.folder.rglob("*") if p.is_file()} == kept
     assert not (asset.folder / MEASURED_FILE).exists()
+
+
+def test_millimetres_and_grams_are_told(tmp_path):
+    asset = made.block(tmp_path / "block")
+    for entry, said in (
+        ("{origin: [0, 0, 60]}", "m from the middle of an object of 0.213 m; expected metres"),
+        ("{adjust: {shift: [10, 0, 0]}}", "the origin is 10"),
+        ("{mass: 800}", "mass 800 kg is more than osmium of that size weighs; expected kilograms"),
+    ):
+        with pytest.raises(InputError, match=said):
+            relabel(asset.folder, _file(tmp_path, f"block: {entry}\n"))
+    assert read_asset(asset.folder).label.origin.tolist() == asset.label.origin.tolist()
+
+
+def test_an_entry_with_nearly_the_name_of_one_asset_is_refused(tmp_path, capsys):
+    asset = made.block(tmp_path / "block")
+    relabel(asset.folder, _file(tmp_path, "block: {mass: 0.7}\n"))
+    with pytest.raises(InputError, match="unknown object 'blok'; did you mean block"):
+        relabel(asset.folder, _file(tmp_path, "blok: {mass: 0.4}\n"))
+    assert read_asset(asset.folder).mass_properties.mass == 0.7
+    other = _file(tmp_path, "spoon: {mass: 0.4}\n")
+    assert main(["assets", "relabel", str(asset.folder), "--labels", str(other)]) == 0
+    assert "block: no entry in" in capsys.readouterr().out
+    assert read_asset(asset.folder).mass_properties.mass == 0.5
 
 
 def test_relabelling_refuses_objects_that_are_not_there(tmp_path):
