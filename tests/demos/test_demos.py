@@ -28,7 +28,13 @@ from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
 from manipose_mj.policies.protocol import ActionSpace
-from tests.demos.recordings import OBJECTS, TASK, config
+from tests.demos.recordings import (
+    OBJECTS,
+    TASK,
+    attempting,
+    config,
+    write_attempt,
+)
 from tests.places import ROOT
 
 
@@ -127,138 +133,6 @@ def test_an_export_without_lerobot_names_the_extra(demos, tmp_path, monkeypatch,
     assert not (tmp_path / "set").exists()
 
 
-def _attempting(config, number, seed):
-    """Instead of an episode: every third attempt fails."""
-    stage = "grasp" if number % 3 == 1 else None
-    arrays = recording_arrays(np.full((number + 1, 8), float(number)))
-    write_attempt(config, number, seed, stage, arrays)
-    return stage is None
-
-
-def recording_arrays(actions):
-    from manipose_mj.demos.layout import DemoArrays
-
-    states = np.zeros((len(actions) + 1, 3), np.float32)
-    return DemoArrays(actions, states, states, np.ones(len(actions), bool), False)
-
-
-def write_attempt(config, number, seed, stage, arrays):
-    from manipose_mj.demos.attempts import attempt_file
-    from manipose_mj.demos.layout import write_episode, writing
-
-    path = attempt_file(config.parts, number)
-    if stage is None or config.failures:
-        with writing(path.with_suffix(".h5")) as file:
-            write_episode(file, number, arrays)
-    path.write_text(
-        json.dumps(
-            {
-                "episode_id": number,
-                "episode_seed": seed,
-                "control_mode": "pd_joint_pos",
-                "elapsed_steps": number + 1,
-                "success": stage is None,
-                "failure": stage,
-                "object": "mug_000",
-                "instruction": "Do it.",
-                "state_sha256": "",
-                "reset_kwargs": {"seed": seed},
-            }
-        )
-    )
-
-
-def test_the_first_successes_are_kept_whatever_was_interrupted(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
-    whole = record(config(tmp_path / "whole", episodes=5))
-    assert [each.elapsed_steps for each in whole.episodes] == [1, 3, 4, 6, 7]
-
-    def interrupted(config, number, seed):
-        if number == 3:
-            raise KeyboardInterrupt
-        return _attempting(config, number, seed)
-
-    monkeypatch.setattr(recording, "_attempt", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        record(config(tmp_path / "cut", episodes=5))
-    calls = []
-
-    def counted(config, number, seed):
-        calls.append(number)
-        return _attempting(config, number, seed)
-
-    monkeypatch.setattr(recording, "_attempt", counted)
-    with pytest.raises(InputError, match="add --resume"):
-        record(config(tmp_path / "cut", episodes=5))
-    with pytest.raises(InputError, match="its attempts have seed 1, this run has 2"):
-        record(config(tmp_path / "cut", episodes=5, seed=2), resume=True)
-    again = record(config(tmp_path / "cut", episodes=5), resume=True)
-    assert calls == [3, 4, 5, 6] and again.episodes == whole.episodes
-    assert record(config(tmp_path / "cut", episodes=5), resume=True).episodes == whole.episodes
-    with pytest.raises(InputError, match="holds 5 successes; add --resume for more"):
-        record(config(tmp_path / "cut", episodes=6))
-    with pytest.raises(InputError, match="recorded with another --seed"):
-        record(config(tmp_path / "cut", episodes=5, seed=2), resume=True)
-    with pytest.raises(InputError, match="its objects are others"):
-        record(config(tmp_path / "cut", episodes=5, objects=("mug_000",)), resume=True)
-
-
-def test_a_set_is_extended(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
-    whole = record(config(tmp_path / "whole", episodes=5))
-    record(config(tmp_path / "grown", episodes=2))
-    calls = []
-
-    def counted(config, number, seed):
-        calls.append(number)
-        if number == 6 and calls.count(6) == 1:
-            raise KeyboardInterrupt
-        return _attempting(config, number, seed)
-
-    monkeypatch.setattr(recording, "_attempt", counted)
-    asked = config(tmp_path / "grown", episodes=5)
-    with pytest.raises(KeyboardInterrupt):
-        record(asked, resume=True)
-    assert len(read_set(asked.path).episodes) == 2  # nothing is lost, also not by asking for fewer
-    record(config(tmp_path / "grown", episodes=2), resume=True)
-    assert (asked.parts / "00004.json").is_file()
-    assert record(asked, resume=True).episodes == whole.episodes
-    assert calls == [3, 4, 5, 6, 6] and not asked.parts.exists()
-    assert asked.path.read_bytes() == whole.path.read_bytes()
-    assert read_set(asked.path).document == whole.document
-    for each in whole.episodes:
-        assert (read_actions(read_set(asked.path), each) == each.elapsed_steps - 1).all()
-
-
-def test_a_set_is_extended_by_what_it_holds_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
-    record(config(tmp_path / "successes", episodes=2))
-    record(config(tmp_path / "both", episodes=2, failures=True))
-    more = {"episodes": 3}
-    with pytest.raises(InputError, match="lacks its failures; leave out --failures"):
-        record(config(tmp_path / "successes", failures=True, **more), resume=True)
-    with pytest.raises(InputError, match="holds failures too; add --failures"):
-        record(config(tmp_path / "both", **more), resume=True)
-    grown = record(config(tmp_path / "both", failures=True, **more), resume=True)
-    assert [each.success for each in grown.episodes] == [True, False, True, True]
-    monkeypatch.setattr(recording, "current_versions", lambda: {"mujoco": "0.1"})
-    with pytest.raises(InputError, match="this run has {'mujoco': '0.1'}; choose another --out"):
-        record(config(tmp_path / "successes", **more), resume=True)
-
-
-def test_a_set_of_other_builds_is_not_extended(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
-    asset = tmp_path / "assets" / "mug" / "asset.json"
-    asset.parent.mkdir(parents=True)
-    asset.write_text('{"schema_version": 1, "name": "mug", "provenance": {"generator": "one"}}')
-    objects = {"objects": (str(tmp_path / "assets"),)}
-    record(config(tmp_path / "out", episodes=1, **objects))
-    assert len(record(config(tmp_path / "out", episodes=2, **objects), resume=True).episodes) == 2
-    asset.write_text('{"schema_version": 1, "name": "mug", "provenance": {"generator": "two"}}')
-    with pytest.raises(InputError, match="its objects were built otherwise"):
-        record(config(tmp_path / "out", episodes=3, **objects), resume=True)
-
-
 def test_changes_of_targets_are_played_at_their_rate_only(copied):
     description = copied.with_suffix(".json")
     description.write_text(description.read_text().replace("pd_joint_pos", "pd_ee_delta_pose"))
@@ -272,7 +146,7 @@ def test_changes_of_targets_are_played_at_their_rate_only(copied):
 
 
 def test_recordings_name_folders_of_objects_by_their_whole_path(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
+    monkeypatch.setattr(recording, "_attempt", attempting)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my assets").mkdir()
     recorded = record(config(Path("out"), episodes=1, objects=("my assets", "mug_000")))
@@ -292,7 +166,7 @@ def test_record_takes_patterns(tmp_path, monkeypatch):
 
 
 def test_failures_are_kept_with_their_stage_where_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "_attempt", _attempting)
+    monkeypatch.setattr(recording, "_attempt", attempting)
     kept = record(config(tmp_path, episodes=3, failures=True))
     assert [each.failure for each in kept.episodes] == [None, "grasp", None, None]
 

@@ -2,8 +2,8 @@
 
 Modes are `state` (the robot's joints and gripper), `pose`, `rgb`, `depth`, `segmentation` and `pointcloud`;
 each is a set of observables whose keys start with its name. A single key, such as `depth/front`, may
-stand in place of a mode. Images bring `camera/NAME/pose` (`T_world_camera`, OpenCV's axes) and
-`camera/NAME/intrinsics` with them.
+stand in place of a mode and brings nothing else. Modes of images bring `camera/NAME/pose` (`T_world_camera`,
+OpenCV's axes) and `camera/NAME/intrinsics` with them.
 """
 
 from __future__ import annotations
@@ -207,7 +207,5 @@ def _enable(
         each.enabled = "state" in modes or name in modes
     for name, each in observables.items():
         mode = name.split("/")[0]
-        camera = name.partition("/")[2].rpartition("/")[0]
-        shown = {*_IMAGES, *(f"{image}/{camera}" for image in _IMAGES)}
-        images = mode == "camera" and not modes.isdisjoint(shown)
+        images = mode == "camera" and not modes.isdisjoint(_IMAGES)
         each.enabled = mode in modes or name in modes or images
