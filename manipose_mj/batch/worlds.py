@@ -315,7 +315,10 @@ class Worlds:
             def held(state: State, _: None) -> tuple[State, None]:
                 commands, targets = self._controller.hold(state.commands, rows)
                 after = self._advanced(state._replace(commands=commands), targets)
-                return _choose(state.count >= layout.horizon, state, after), None
+                # Of a world at its horizon the simulation is not needed any more.
+                told = (each._replace(simulation={}) for each in (state, after))
+                kept = _choose(state.count >= layout.horizon, *told)
+                return kept._replace(simulation=after.simulation), None
 
             going_on, _ = jax.lax.scan(held, going_on, length=hold - 1)
         diverged = going_on.terminated
