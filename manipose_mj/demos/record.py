@@ -25,7 +25,7 @@ from manipose_mj.demos.layout import (
 )
 from manipose_mj.errors import InputError, worker_deaths
 from manipose_mj.evaluation.config import episode_seed
-from manipose_mj.evaluation.protocol.own_assets import built_assets, digest_of
+from manipose_mj.evaluation.protocol.own_assets import digest_of_objects
 from manipose_mj.evaluation.records import write_atomically
 
 if TYPE_CHECKING:
@@ -91,10 +91,7 @@ class RecordConfig:
     @property
     def assets_digest(self) -> str | None:
         """Which builds of the user's assets episodes are of; None where all are built in."""
-        from manipose_mj.tasks.core.object_selection import is_folder
-
-        folders = [each for each in self.objects or () if is_folder(each)]
-        return digest_of(built_assets(folders)) if folders else None
+        return digest_of_objects(self.objects)
 
     @property
     def identity(self) -> dict[str, Any]:

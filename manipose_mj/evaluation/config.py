@@ -25,8 +25,8 @@ from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.protocol.own_assets import (
-    built_assets,
     digest_of,
+    digest_of_objects,
     find_assets,
     pool_folders,
 )
@@ -212,10 +212,7 @@ class EvaluationConfig:
         """Which builds of the user's assets the episodes use; None where all are built in."""
         if self.protocol is not None and self.assets:
             return digest_of(find_assets(self.protocol, self.tasks, self.assets).values())
-        from manipose_mj.tasks.core.object_selection import is_folder  # loads the simulator
-
-        folders = [each for each in self.objects or () if is_folder(each)]
-        return digest_of(built_assets(folders)) if folders else None
+        return digest_of_objects(self.objects)
 
     @property
     def poses(self) -> dict[str, str]:

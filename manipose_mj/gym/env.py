@@ -17,7 +17,6 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
 from manipose_mj.tasks.core.config import EnvOptions, EpisodeSpec, check_seed, env_config
-from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.registry import TaskSpec, named_task
 from manipose_mj.tasks.goals import Goal, success
 from manipose_mj.tasks.instructions.sentence import instruction
@@ -235,13 +234,6 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
     index = asked.pop("start_index", None)
     if index is not None:
         check_seed(index, "start_index")
-    if "goal" in asked:
-        try:
-            pose = np.asarray(asked["goal"], float)
-        except (TypeError, ValueError):
-            raise InputError("goal is no array of numbers; expected a pose, 4 x 4") from None
-        check_pose(pose)
-        asked["goal"] = tuple(map(tuple, pose.tolist()))
     for name in asked.keys() - {"goal"}:
         if not isinstance(asked[name], str):
             raise InputError(f"{name} is {asked[name]!r}; expected a name")

@@ -29,29 +29,27 @@ class Window(nullcontext):
         self.times.append(self.data.time)
 
 
-def test_the_window_shows_a_running_task(monkeypatch):
-    windows = []
+@pytest.fixture
+def windows(monkeypatch):
+    """Those that are opened."""
+    found = []
 
     def opened(model, data):
-        windows.append(Window(data))
-        return windows[-1]
+        found.append(Window(data))
+        return found[-1]
 
     monkeypatch.setattr("manipose_mj.mjcf.views.viewer.require_display", lambda: None)
     monkeypatch.setattr("manipose_mj.mjcf.views.viewer.open_viewer", opened)
+    return found
+
+
+def test_the_window_shows_a_running_task(windows):
     assert main(["view", "single_object/target_pose", "--objects", "mug_000", "--seed", "3"]) == 0
     assert windows[0].times == pytest.approx([0.02, 0.04, 0.06, 0.08, 0.1])
 
 
 @pytest.mark.full
-def test_an_episode_with_other_objects_has_a_window_of_its_own(monkeypatch):
-    windows = []
-
-    def opened(model, data):
-        windows.append(Window(data))
-        return windows[-1]
-
-    monkeypatch.setattr("manipose_mj.mjcf.views.viewer.require_display", lambda: None)
-    monkeypatch.setattr("manipose_mj.mjcf.views.viewer.open_viewer", opened)
+def test_an_episode_with_other_objects_has_a_window_of_its_own(windows, monkeypatch):
     monkeypatch.setattr(
         "manipose_mj.tasks.core.task.ManipulationTask.should_terminate_episode", _ends
     )

@@ -126,6 +126,14 @@ def _how_to_get(
     )
 
 
+def digest_of_objects(objects: Iterable[str] | None) -> str | None:
+    """`digest_of` of the asset folders among what an environment draws from; None where all are built in."""
+    from manipose_mj.tasks.core.object_selection import is_folder  # loads the simulator
+
+    folders = [each for each in objects or () if is_folder(each)]
+    return digest_of(built_assets(folders)) if folders else None
+
+
 def digest_of(assets: Iterable[BuiltAsset]) -> str:
     """The sha256 of what assets were made of and by what: results of other ones do not belong together."""
     stated = sorted([asset.data_set, asset.name, asset.made] for asset in assets)

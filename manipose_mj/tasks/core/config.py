@@ -137,7 +137,7 @@ class EpisodeSpec:
         draws one.
       furniture: Name of the articulated asset, likewise.
       part: Name of the drawer or door that it shall be about, likewise.
-      goal: `T_world_label` that the object shall have in the end, rows of a `(4, 4)` matrix; None draws it.
+      goal: `T_world_label` that the object shall have in the end, `(4, 4)`, kept as rows; None draws it.
 
     Raises:
       InputError: The seed is no whole number from 0 to 2**32 - 1, or the goal no pose.
@@ -158,6 +158,7 @@ class EpisodeSpec:
             except (TypeError, ValueError):
                 raise InputError("goal is no array of numbers; expected a pose, 4 x 4") from None
             check_pose(pose)
+            object.__setattr__(self, "goal", tuple(map(tuple, pose.tolist())))
 
 
 def check_seed(seed: Any, what: str = "seed") -> None:
