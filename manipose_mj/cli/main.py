@@ -25,7 +25,6 @@ from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.cli.protocol import build_app as build_protocol_app
 from manipose_mj.cli.train import build_app as build_train_app
-from manipose_mj.console.process import hush_glfw
 from manipose_mj.errors import InputError, WorkerDiedError
 
 DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
@@ -63,7 +62,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     0: done; 1: done, and something failed a check; 2: the input or its place on disk was wrong;
     130: interrupted.
     """
-    hush_glfw()
     try:
         config = (tyro.conf.FlagCreatePairsOff,)
         return (

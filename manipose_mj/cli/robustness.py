@@ -11,7 +11,6 @@ from tyro.conf import Positional, arg
 from manipose_mj.console.process import (
     CORES,
     compile_at_once_on_gpus,
-    hush_glfw,
     prepare_workers,
 )
 from manipose_mj.errors import InputError
@@ -58,7 +57,6 @@ def robustness(
       jobs: Processes.
     """
     prepare_workers(jobs)
-    hush_glfw()
     compile_at_once_on_gpus()
     from manipose_mj.batch.making import available_engine, require_worlds
     from manipose_mj.cli.evaluate import check_names

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import warnings
 from pathlib import Path
 
 from manipose_mj.errors import InputError
@@ -50,12 +49,6 @@ def prepare_workers(jobs: int) -> None:
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; expected at least 1")
     one_thread_per_process()
-
-
-def hush_glfw() -> None:
-    """Keep quiet that there is no display: dm_control tries one as it is imported, also in workers."""
-    warnings.filterwarnings("ignore", module="glfw")
-    os.environ.setdefault("PYTHONWARNINGS", "ignore:::glfw")
 
 
 _FUSION_AUTOTUNER = "--xla_gpu_experimental_enable_fusion_autotuner"
