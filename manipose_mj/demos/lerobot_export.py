@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,6 +17,7 @@ from manipose_mj.errors import InputError, how_to_install
 from manipose_mj.evaluation.episode import environment_of
 from manipose_mj.evaluation.rollout import Rollout, Rules
 from manipose_mj.gym.features import AGENT_NAMES, CAMERAS, IMAGE_SIZE, Features, feature_sensors
+from manipose_mj.storage.staging import staging
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
 ACTION_NAMES = (*AGENT_NAMES[:7], "opening")
@@ -128,19 +130,23 @@ def export(
         )
     # All, before anything is written: a broken file shall leave no part of a data set behind.
     recorded = [slowed(read_actions(demos, episode), config.hz) for demos, episode in sources]
-    writer = open_writer(config, layouts[0])
     written, frames = 0, 0
-    for done, ((demos, episode), actions) in enumerate(
-        zip(sources, recorded, strict=True), start=1
-    ):
-        seen, success = _replayed(_env_config(demos, config), episode.episode_seed, actions, config)
-        if success:
-            for observation, action in zip(seen, actions, strict=False):
-                writer.add_frame(frame(observation, action))
-            writer.save_episode()
-            written, frames = written + 1, frames + min(len(seen), len(actions))
-        on_progress(done, len(sources))
-    writer.finalize()
+    with staging(config.out) as aside:  # an export that is interrupted leaves nothing
+        built = aside / config.out.name
+        writer = open_writer(replace(config, out=built), layouts[0])
+        for done, ((demos, episode), actions) in enumerate(
+            zip(sources, recorded, strict=True), start=1
+        ):
+            env_config = _env_config(demos, config)
+            seen, success = _replayed(env_config, episode.episode_seed, actions, config)
+            if success:
+                for observation, action in zip(seen, actions, strict=False):
+                    writer.add_frame(frame(observation, action))
+                writer.save_episode()
+                written, frames = written + 1, frames + min(len(seen), len(actions))
+            on_progress(done, len(sources))
+        writer.finalize()
+        os.rename(built, config.out)
     return Exported(written, len(sources) - written, frames)
 
 

@@ -106,11 +106,20 @@ def test_an_export_replays_at_its_rate_and_writes_frames(demos, tmp_path):
     opened = []
 
     def open_writer(asked, features):
+        asked.out.mkdir()
         opened.append(_Writer(features))
-        return opened[0]
+        return opened[-1]
 
-    done = export([demos], ExportConfig(tmp_path / "set"), open_writer=open_writer)
+    def interrupted(done, total):
+        raise KeyboardInterrupt
+
+    config = ExportConfig(tmp_path / "sets" / "set")
+    with pytest.raises(KeyboardInterrupt):
+        export([demos], config, open_writer=open_writer, on_progress=interrupted)
+    assert not opened.pop().finalized and not list(config.out.parent.iterdir())
+    done = export([demos], config, open_writer=open_writer)
     (writer,) = opened
+    assert [each.name for each in config.out.parent.iterdir()] == ["set"]
     assert writer.finalized and writer.episodes == done.episodes == 2 and done.lost == 0
     assert done.frames == len(writer.frames)
     assert done.frames == sum(-(-each.elapsed_steps // 5) for each in demos.episodes)
