@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -17,6 +18,7 @@ from manipose_mj.control.baseline import MAX_PLANS
 from manipose_mj.control.perception.perturbed import UNPERTURBED, PosePerturbation
 from manipose_mj.control.perception.source_names import GraspSource, masks_of
 from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.answer import EstimatorFailedError
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.estimate_errors import EstimateErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
@@ -188,7 +190,16 @@ def play(
         outcome = rollout.run(first)
     recorder.record()
     wall_s = time.perf_counter() - started
-    return _result(environment, outcome, naming, seed, estimates, wall_s), recorder.trajectory()
+    result = _result(environment, outcome, naming, seed, estimates, wall_s)
+    return result, replace(recorder.trajectory(), raised=_raised(outcome.failure))
+
+
+def _raised(failure: StageFailure | None) -> str:
+    """The traceback of what an estimator raised, where that ended the episode."""
+    failed = None if failure is None else failure.__cause__
+    if not isinstance(failed, EstimatorFailedError) or failed.__cause__ is None:
+        return ""
+    return "".join(traceback.format_exception(failed.__cause__))
 
 
 def _observer(features: Features | None, droid: bool) -> Callable[[Any], dict[str, Any]]:

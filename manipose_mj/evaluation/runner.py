@@ -294,6 +294,8 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
         write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))
         return _crashed(config, task, episode, error, time.perf_counter() - start)
     write_trajectory(path, trajectory)
+    if trajectory.raised:
+        write_atomically(path.with_suffix(".error.txt"), trajectory.raised.encode("utf-8"))
     return result
 
 

@@ -93,3 +93,14 @@ def test_episodes_are_asked_of_it(tmp_path, monkeypatch):
     monkeypatch.setattr("manipose_mj.evaluation.episode.run_episode", run_episode)
     evaluate(config(tmp_path))
     assert asked == [("estimated", MIDDLE)] * 4
+
+
+@pytest.mark.full
+def test_an_estimator_that_raises_leaves_its_traceback(tmp_path):
+    raises = EstimatorSettings("tests.estimators.answers:Raises")
+    asked = replace(config(tmp_path, raises), objects=few(TASK), episodes=1)
+    (result,) = evaluate(asked)
+    assert result.failure == "perception" and "raised KeyError" in result.reason
+    (note,) = tmp_path.rglob("*.error.txt")
+    assert "answers.py" in note.read_text() and "KeyError" in note.read_text().splitlines()[-1]
+    assert note.with_name(note.name.replace(".error.txt", ".npz")).is_file()

@@ -45,4 +45,4 @@ class ForeignEstimator:
         try:
             return self._service.estimate(observation)
         except EstimatorFailedError as error:
-            raise StageFailure("perception", str(error)) from None
+            raise StageFailure("perception", str(error)) from error
