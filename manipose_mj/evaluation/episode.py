@@ -220,12 +220,13 @@ def _result(
     wall_s: float,
 ) -> EpisodeResult:
     task, physics, failure = environment.task, environment.physics, outcome.failure
-    success = task.succeeded(physics) and (failure is None or failure.stage != "physics")
+    diverged = failure is not None and failure.stage == "physics"
+    success = task.succeeded(physics) and not diverged
     if failure is None and not success:
         failure = StageFailure("release", "the goal is not met though the plan was carried out")
     if failure is not None and not success and estimates is not None:
         failure = estimates.cause(failure)
-    error = task.goal_error(physics)
+    error = None if diverged else task.goal_error(physics)
     return EpisodeResult(
         task=naming.task,
         episode=naming.episode,

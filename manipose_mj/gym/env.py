@@ -35,7 +35,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
 
     `info` holds `success` and `is_success` (all goals are met now), `success_once` (they were, at some step of this
     episode), `failure` (`"physics"` after a divergence, else empty) and, for tasks with goal poses,
-    `goal_error`: the largest translation [m] and rotation [rad] that is left, `(2,)`.
+    `goal_error`: the largest translation [m] and rotation [rad] that is left, `(2,)`; NaN once the simulation has failed.
 
     A pickled environment is built anew from its arguments, with the random state it had.
     """
@@ -115,7 +115,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         self._require_open()
         self._running = False  # until the reset has succeeded
         spec = _episode(seed, options or {})
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else int(seed))  # NumPy's numbers too
         step = self.environment.reset(spec)
         self._running = True
         self._show()
@@ -208,7 +208,8 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         }
         error = task.goal_error(self.environment.physics)
         if error is not None:
-            info["goal_error"] = np.array(error)
+            failed = self.environment.failure != ""
+            info["goal_error"] = np.full(2, np.nan) if failed else np.array(error)
         return info
 
     def __reduce__(self) -> tuple[Any, ...]:

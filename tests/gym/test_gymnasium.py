@@ -164,6 +164,25 @@ def test_a_divergence_terminates_with_its_failure_and_the_next_episode_is_clean(
             assert truncated == (count == 20)  # the task's horizon
 
 
+def test_where_a_simulation_diverges_nothing_is_a_success():
+    # MuJoCo goes back to its own state, where drawers are shut.
+    broken = gymnasium.make(env_id("close_top_drawer")).unwrapped
+    broken.reset(seed=0)
+    broken.environment.physics.data.qvel[:] = 1e9
+    _, reward, terminated, _, info = broken.step(np.zeros(8, np.float32))
+    assert terminated and reward == 0.0 and info["failure"] == "physics"
+    assert not info["success"] and not info["success_once"]
+    assert broken.environment.task.max_penetration < 0.1
+    broken.close()
+
+
+def test_what_is_left_to_the_goal_of_a_simulation_that_diverged_is_unknown(env):
+    env.reset(seed=0)
+    env.environment.physics.data.qvel[:] = 1e11
+    *_, info = env.step(np.zeros(8, np.float32))
+    assert info["failure"] == "physics" and np.isnan(info["goal_error"]).all()
+
+
 def test_success_and_reward_are_functions_of_a_state(env):
     env.reset(seed=1)
     state = env.scene_state()
@@ -231,7 +250,10 @@ def test_other_wrong_input_is_one_line(env, monkeypatch):
         env.reset(options={"object": "mug_00"})
     with pytest.raises(InputError, match="object is 5; expected a name"):
         env.reset(options={"object": 5})
-    env.reset(seed=0)
+    env.reset(seed=np.int64(0))
+    for options in ({"objects": 5}, {"randomisation": None}):
+        with pytest.raises(InputError, match=f"{next(iter(options))}"):
+            gymnasium.make(ID, **options)
     for action in (np.zeros(7), np.full(8, np.nan)):
         with pytest.raises(InputError, match="8 finite numbers"):
             env.step(action)
