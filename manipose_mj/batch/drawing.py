@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -31,6 +31,7 @@ from manipose_mj.tasks.observations.sensors import parse_modes
 from manipose_mj.tasks.scene.indices import FIRST, NOBODY, SceneShapes, find_indices, shapes_of
 
 OBSERVED = ("state", "pose")  # modes
+_ROBOT = "panda"  # whose single keys are modes too
 # Makes other starts of an environment that was reset to one; how many there are is the caller's business.
 Vary = Callable[[TaskEnvironment, EpisodeStart], Iterable[EpisodeStart]]
 _CONSTANT = tuple(
@@ -67,6 +68,11 @@ def draw_pool(
         if not isinstance(each, EpisodeSpec):
             check_seed(each)
     specs = [e if isinstance(e, EpisodeSpec) else EpisodeSpec(seed=int(e)) for e in episodes]
+    seen: set[int | None] = set()
+    for spec in specs:
+        if spec.seed in seen:
+            raise InputError(f"seed {spec.seed} is given twice; expected each seed once")
+        seen.add(spec.seed)
     environment = suite.make(config, specs[0].seed)
     assert isinstance(environment, TaskEnvironment)
     drawn = _Drawing(environment, config)
@@ -79,7 +85,7 @@ def draw_pool(
 def _require_batchable(config: EnvConfig) -> None:
     control_law(config.control_mode)
     for mode in parse_modes(config.obs_mode):
-        if mode.split("/")[0] not in OBSERVED:
+        if mode.split("/")[0] not in (*OBSERVED, _ROBOT):
             raise unknown_name("observation mode of batched worlds", mode, OBSERVED)
     if config.sensors.pose_noise != PoseNoise():
         raise InputError("pose noise is not available in batched worlds: set sensors without it")
@@ -309,8 +315,8 @@ def _part_slots(goals: Sequence[Goal]) -> dict[str, str]:
 
 
 def _renamed(goal: Goal, parts: Mapping[str, str]) -> Goal:
-    changes = {f.name: parts[getattr(goal, f.name)] for f in fields(goal) if f.name == "part"}  # pyright: ignore[reportArgumentType]
-    return replace(goal, **changes)  # pyright: ignore[reportArgumentType]
+    part: Any = getattr(goal, "part", None)
+    return replace(goal, part=parts[part]) if part in parts else goal  # pyright: ignore[reportArgumentType, reportCallIssue]
 
 
 def _control_steps(horizon: float, timestep: float, substeps: int) -> int:

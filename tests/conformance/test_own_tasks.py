@@ -12,7 +12,7 @@ import pytest
 from dm_control import suite as dm_suite
 
 import manipose_mj
-from manipose_mj import suite
+from manipose_mj import batch, suite
 from manipose_mj.errors import InputError
 from manipose_mj.gym import env_id
 from manipose_mj.tasks.core.registry import task_spec
@@ -51,6 +51,15 @@ def test_every_front_door_knows_a_task_of_ones_own(lift_mug):
     for other in starts[1:]:
         assert other.keys() == starts[0].keys()
         assert all(np.array_equal(other[name], value) for name, value in starts[0].items())
+
+
+@pytest.mark.full
+def test_batched_worlds_play_it(lift_mug):
+    worlds = batch.make("/".join(lift_mug), worlds=1, seed=3, engine="c", objects=["mug_000"])
+    begun = worlds.at([3])
+    state = worlds.step(begun, begun.observation["panda/joint_positions"][:, [*range(7), 0]])
+    assert not state.success.any() and not state.done.any()
+    worlds.close()
 
 
 def test_the_example_rewards_lifting(lift_mug):

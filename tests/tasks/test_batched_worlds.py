@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
+from typing import Literal
 
 import jax
 import numpy as np
@@ -191,6 +192,18 @@ def test_own_goals_are_registered_by_their_annotations():
     register(OpenGoal)  # a second time changes nothing
     leaves, structure = jax.tree.flatten(goal)
     assert len(leaves) == 1 and jax.tree.unflatten(structure, leaves).part == "part"
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_names_and_numbers_of_own_goals_are_no_arrays_however_they_are_annotated(written):
+    kinds = {"object": str, "count": int, "high": bool, "part": str | None, "also": tuple[str, ...]}
+    kinds |= {"how": Literal["in", "on"]}
+    told = {"object": "str", "count": "int"} if written else {}
+    annotated = [(name, told.get(name, kind)) for name, kind in kinds.items()]
+    cls = make_dataclass("Lifted", [*annotated, ("at", np.ndarray)], frozen=True)
+    register(cls)
+    leaves = jax.tree.leaves(cls("a", 2, True, None, ("b",), "in", np.zeros(3)))
+    assert len(leaves) == 1 and leaves[0].shape == (3,)
 
 
 @pytest.fixture(scope="module")

@@ -34,8 +34,8 @@ class GoalFrame:
     object: str
     pose: Float[Array, "*b 4 4"]
     symmetry: SymmetryGroup
-    translation_counts: bool = True
-    rotation_counts: bool = True
+    translation_counts: Bool[Array, "*b"] | bool = True
+    rotation_counts: Bool[Array, "*b"] | bool = True
 
 
 class Goal(abc.ABC):
