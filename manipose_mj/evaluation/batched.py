@@ -22,7 +22,7 @@ from manipose_mj.evaluation.policy_settings import CONTROL_HZ, PolicySettings
 from manipose_mj.evaluation.records import EpisodeResult
 from manipose_mj.evaluation.rollout import ROUNDING, SUCCESS_HELD
 from manipose_mj.policies.loading import load_policy
-from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.policies.protocol import NOT_FINITE, ActionSpace
 from manipose_mj.poses import Array
 
 _LOOK_EVERY = 5  # actions between looks at whether all episodes have ended
@@ -41,7 +41,8 @@ class BatchPolicy(Protocol):
 class _Ends:
     """How the episodes ended, by world.
 
-    Attributes: ended; success; once; diverged; overflowed; steps, control steps until then; clipped, actions.
+    Attributes: ended; success; once; diverged; overflowed; invalid, by an action that is no finite number; steps,
+      control steps until then; clipped, actions.
     """
 
     ended: np.ndarray
@@ -49,6 +50,7 @@ class _Ends:
     once: np.ndarray
     diverged: np.ndarray
     overflowed: np.ndarray
+    invalid: np.ndarray
     steps: np.ndarray
     clipped: np.ndarray
 
@@ -126,8 +128,9 @@ def _played(
     state, ends = worlds.at(seeds), _no_ends(worlds.count)
     taken = 0
     while not ends.ended.all():
-        state, (looks, clipped) = several(state)
-        for i, (now, over) in enumerate(zip(_unstacked(looks), np.asarray(clipped), strict=True)):
+        state, (looks, clipped, invalid) = several(state)
+        rows = zip(_unstacked(looks), np.asarray(clipped), np.asarray(invalid), strict=True)
+        for i, (now, over, no_action) in enumerate(rows):
             steps = (taken + i + 1) * hold
             playing = ~ends.ended
             ends.clipped += playing & over
@@ -137,7 +140,9 @@ def _played(
             ends.success = np.where(ending, now["success"] | held, ends.success)
             ends.diverged = np.where(ending, now["terminated"], ends.diverged)
             ends.overflowed |= playing & now["overflowed"]
+            ends.invalid |= ending & no_action & now["terminated"]
             early = np.where(held, now["streak"] - enough, 0)
+            early = np.where(ends.invalid & ending, hold, early)  # it was not carried out
             ends.steps = np.where(ending, np.minimum(steps, horizon) - early, ends.steps)
             ends.ended |= ending
         taken += _LOOK_EVERY
@@ -160,10 +165,11 @@ def _several(
             raise InputError(
                 f"--policy {name}: act answered with shape {action.shape}; expected {shape}, worlds and numbers of an action"
             )
+        invalid = ~jnp.isfinite(action).all(-1)
         beyond = jnp.abs(jnp.clip(action, worlds.lower, worlds.upper) - action).max(-1)
         after = worlds.step(state, action, hold)
         looks = {name: getattr(after, name) for name in _LOOKED_AT}
-        return after, (looks, beyond > ROUNDING)
+        return after, (looks, beyond > ROUNDING, invalid)
 
     return jax.jit(lambda state: jax.lax.scan(one, state, length=_LOOK_EVERY))
 
@@ -189,7 +195,7 @@ def _no_ends(count: int) -> _Ends:
     def no() -> np.ndarray:
         return np.zeros(count, bool)
 
-    return _Ends(no(), no(), no(), no(), no(), np.zeros(count, int), np.zeros(count, int))
+    return _Ends(no(), no(), no(), no(), no(), no(), np.zeros(count, int), np.zeros(count, int))
 
 
 def _result(
@@ -207,6 +213,8 @@ def _result(
     failure, reason = "timeout", "not done at the time limit"
     if ends.diverged[world]:
         failure, reason = "physics", "the simulation diverged"
+    if ends.invalid[world]:
+        failure, reason = "policy", NOT_FINITE
     if ends.overflowed[world]:
         failure, reason = "physics", "the engine had too little room for the contacts"
         success = False

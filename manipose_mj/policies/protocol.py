@@ -11,6 +11,8 @@ from jaxtyping import Float
 
 from manipose_mj.failures import StageFailure
 
+NOT_FINITE = "an action holds a value that is no finite number"
+
 
 @dataclass(frozen=True)
 class ActionSpace:
@@ -118,7 +120,7 @@ def checked_answer(answer: Any, size: int) -> Decision:
             "policy", f"the actions have shape {actions.shape}; expected (t, {size}) with t > 0"
         )
     if not np.isfinite(actions).all():
-        raise StageFailure("policy", "an action holds a value that is no finite number")
+        raise StageFailure("policy", NOT_FINITE)
     return Decision(actions, done)
 
 

@@ -74,6 +74,16 @@ class Narrow(Alone):
         return jnp.zeros((2, 6))
 
 
+class Nothing(Alone):
+    """A policy that answers no numbers."""
+
+    def infer(self, obs):
+        return {"actions": np.full((1, 7), np.nan)}
+
+    def act(self, observation):
+        return jnp.full((len(observation["panda/tcp_pose"]), 7), jnp.nan)
+
+
 class Unready(Puller):
     """A policy that cannot begin."""
 
@@ -107,6 +117,16 @@ def test_verdicts_are_those_of_single_environments(tmp_path, stop):
         assert other.max_penetration is None
     again = evaluate(config(tmp_path / "together", "Puller", batch, stop=stop), resume=True)
     assert again == together
+
+
+@pytest.mark.full
+def test_what_is_no_number_is_the_policys_failure_in_one_world_and_in_many(tmp_path):
+    alone = evaluate(config(tmp_path / "alone", "Nothing", None))
+    together = evaluate(config(tmp_path / "together", "Nothing", BatchSettings("c", 2)))
+    for one, other in zip(alone, together, strict=True):
+        assert one.failure == "policy" and one.steps == 0
+        for name in ("failure", "reason", "steps", "success_at_end", "success_once"):
+            assert getattr(one, name) == getattr(other, name), name
 
 
 def test_policies_that_act_in_one_world_and_odd_rates_are_refused(tmp_path):
