@@ -34,7 +34,7 @@ def unknown_name(kind: str, name: str, valid: Iterable[str], *, listed_by: str =
       listed_by: Command that lists them, where they are many.
     """
     names = sorted(valid)
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(str(name), names, n=3, cutoff=0.5)
     if near:
         return InputError(f"unknown {kind} {name!r}; did you mean {', '.join(near)}?")
     if len(names) <= _AT_MOST:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal, Unpack
 
 import jax
+import numpy as np
 
 from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
@@ -16,7 +17,7 @@ from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, how_to_install, unknown_name
-from manipose_mj.tasks.core.config import EnvOptions, env_config
+from manipose_mj.tasks.core.config import EnvOptions, check_seed, env_config
 
 ENGINES = ("auto", "c", "warp")
 EngineName = Literal["auto", "c", "warp"]
@@ -57,9 +58,12 @@ def make(
     Raises:
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.
     """
-    if seeds is None:
-        seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
     require_worlds(worlds)
+    if seeds is None:
+        check_seed(seed)
+        seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
+    elif not isinstance(seeds, Iterable) or isinstance(seeds, str):
+        raise InputError(f"seeds is {seeds!r}; expected whole numbers, each once")
     chosen = available_engine(engine)
     pool = draw_pool(env_config(task, config), list(seeds))
     return from_pool(pool, worlds, chosen, processes=processes, visual=visual, capacity=capacity)
@@ -91,9 +95,10 @@ def from_pool(
 
 
 def require_worlds(worlds: int) -> None:
-    """Raises InputError where there would be none."""
-    if worlds < 1:
-        raise InputError(f"worlds is {worlds}; expected at least 1")
+    """Raises InputError where there would be none, or no whole number."""
+    whole = isinstance(worlds, int | np.integer) and not isinstance(worlds, bool)
+    if not whole or worlds < 1:
+        raise InputError(f"worlds is {worlds!r}; expected a whole number, at least 1")
 
 
 def available_engine(engine: str) -> Literal["c", "warp"]:

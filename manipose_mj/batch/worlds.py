@@ -21,6 +21,7 @@ from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.poses import Array
 from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.tasks.core.config import check_seed
 
 Policy = Callable[[Observation, PRNGKeyArray], Float[Array, "worlds n"]]
 
@@ -131,10 +132,14 @@ class Worlds:
           seeds: One a world.
 
         Raises:
-          InputError: They are more or fewer, or the pool has no such start.
+          InputError: They are more or fewer, one is none, or the pool has no such start.
         """
+        if np.ndim(seeds) != 1:
+            raise InputError(f"seeds is {seeds!r}; expected a sequence with one a world")
         if len(seeds) != self.count:
             raise InputError(f"{len(seeds)} seeds for {self.count} worlds; expected one a world")
+        for seed in seeds:
+            check_seed(seed)
         return self._begin_jit(
             jnp.asarray(self.pool.rows([int(seed) for seed in seeds]), jnp.int32)
         )

@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -58,11 +59,15 @@ class BatchedEnv(VectorEnv):
         Raises:
           InputError: An option is given, or a seed is none or not in the pool.
         """
+        self._require_open()
         if options:
             raise InputError(f"batched worlds have no reset options; got {sorted(options)}")
         chosen = _chosen(seed)
         if isinstance(chosen, list):
             state = self.worlds.at(chosen)
+            self._key = jax.random.key(0)
+            for each in chosen:  # what follows, follows from these
+                self._key = jax.random.fold_in(self._key, each)
         else:
             if chosen is not None:
                 self._key = jax.random.key(chosen)
@@ -83,6 +88,7 @@ class BatchedEnv(VectorEnv):
         Raises:
           InputError: No episode was begun, or the actions are no numbers or have another shape.
         """
+        self._require_open()
         if self._state is None:
             raise InputError("no episode was begun: call reset first")
         given = _array(actions)
@@ -100,6 +106,10 @@ class BatchedEnv(VectorEnv):
             "_final_obs": state.done,
         }
         return state.observation, state.reward, state.terminated, state.truncated, infos
+
+    def _require_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("these worlds were closed; make new ones")
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the worlds."""
@@ -127,6 +137,8 @@ def _array(actions: Any) -> np.ndarray | jax.Array:
     if hasattr(actions, "__dlpack__") and not isinstance(actions, np.ndarray):
         return jax.numpy.from_dlpack(actions)
     try:
+        if np.iscomplexobj(actions):
+            raise TypeError
         return np.asarray(actions, np.float32)
     except (TypeError, ValueError):
         raise InputError(f"actions are no numbers in equal rows: {actions!r:.80}") from None

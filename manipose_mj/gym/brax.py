@@ -73,6 +73,8 @@ class BraxWorlds:
         Raises:
           InputError: There are neither one key nor as many as worlds.
         """
+        if not hasattr(rng, "dtype"):
+            raise InputError(f"{rng!r} is no key; expected jax.random.key(0), or one a world")
         shape = np.shape(rng)
         typed = jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
         keys = shape if typed else shape[:-1]
@@ -84,8 +86,15 @@ class BraxWorlds:
         return _as_brax(begun, begun.count)
 
     def step(self, state: BraxState, action: Float[Array, "worlds n"]) -> BraxState:
-        """Go on by one control step; where an episode ends, the next begins."""
+        """Go on by one control step; where an episode ends, the next begins.
+
+        Raises:
+          InputError: The actions have another shape.
+        """
         low, high = self.worlds.lower, self.worlds.upper
+        if np.shape(action) != (self.worlds.count, *low.shape):
+            wanted = (self.worlds.count, *low.shape)
+            raise InputError(f"actions of shape {np.shape(action)}; expected {wanted}")
         bounded = jnp.clip(action, -1.0, 1.0)
         after = self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low))
         return _as_brax(after, state.data.count + 1)

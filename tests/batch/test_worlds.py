@@ -166,6 +166,10 @@ def test_processes_change_nothing(worlds):
 def test_what_cannot_be_is_refused_in_one_line(worlds):
     for arguments, message in (
         ({"worlds": 0}, "worlds is 0"),
+        ({"worlds": 2.5}, "worlds is 2.5; expected a whole number"),
+        ({"seed": None}, "seed is None; expected a whole number"),
+        ({"seeds": 5}, "seeds is 5; expected whole numbers"),
+        ({"seeds": (7, 7)}, "seed 7 is given twice"),
         ({"engine": "wrap"}, "unknown engine 'wrap'"),
         ({"obs_mode": "state+rgb"}, "observation mode of batched worlds"),
         ({"control_mode": "primitive"}, "unknown control mode"),
@@ -176,6 +180,10 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
             make(TASK, **arguments)
     with pytest.raises(InputError, match="2 seeds for 3 worlds"):
         worlds.at([7, 8])
+    with pytest.raises(InputError, match="seeds is 7; expected a sequence"):
+        worlds.at(7)
+    with pytest.raises(InputError, match="seed is 7.5; expected a whole number"):
+        worlds.at([7.5, 8, 7])
     with pytest.raises(InputError, match="seed 9 is not in the pool of 2 starts"):
         worlds.at([7, 8, 9])
     with pytest.raises(InputError, match="needs the number of steps"):

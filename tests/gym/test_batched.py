@@ -7,6 +7,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from gymnasium.error import ClosedEnvironmentError
 
 from manipose_mj import batch
 from manipose_mj.errors import InputError
@@ -54,6 +55,16 @@ def test_seeds_of_the_worlds_come_in_any_sequence(env, form):
     np.testing.assert_array_equal(found, wanted)
 
 
+def test_what_follows_seeds_of_the_worlds_follows_from_them_alone(env):
+    found = []
+    for before in (3, 4, 5):
+        env.reset(seed=before)
+        env.reset(seed=[7, 8])
+        found.append([env.reset()[0]["panda/joint_positions"] for _ in range(3)])
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
+
+
 def test_no_seed_for_each_world_is_no_seed(env):
     env.reset(seed=3)
     wanted = env.reset()[0]["panda/joint_positions"]
@@ -97,9 +108,14 @@ def test_all_kinds_of_actions_share_one_compiled_step(env):
     own.step(jnp.asarray(action))
     assert own.worlds._step_jit._cache_size() == 1
     own.close()
+    for late in (own.reset, lambda: own.step(action)):
+        with pytest.raises(ClosedEnvironmentError, match="closed"):
+            late()
 
 
-@pytest.mark.parametrize("actions", ["left", None, [[0.0] * 8, [0.0] * 7], [["a"] * 8] * 2])
+@pytest.mark.parametrize(
+    "actions", ["left", None, [[0.0] * 8, [0.0] * 7], [["a"] * 8] * 2, [[1j] * 8] * 2]
+)
 def test_what_is_no_action_is_refused(env, actions):
     env.reset(seed=0)
     with pytest.raises(InputError, match="actions "):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict
@@ -75,6 +75,8 @@ class EnvConfig:
         chosen: Any = self.objects
         if chosen is not None:
             one = isinstance(chosen, str | Path | Asset)
+            if not one and not isinstance(chosen, Iterable):
+                raise InputError(f"objects is {chosen!r}; expected names, folders or assets")
             object.__setattr__(self, "objects", (chosen,) if one else tuple(chosen))
             for each in self.objects or ():
                 if not isinstance(each, str | Path | Asset):
