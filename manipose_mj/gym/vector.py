@@ -5,14 +5,25 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv
+import gymnasium
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.wrappers import TimeLimit
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.env import ManiPoseEnv
 from manipose_mj.tasks.core.registry import named_task
 
+_MODES = [mode.value for mode in AutoresetMode]
 
-def make_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv:
+
+def make_vector(
+    num_envs: int = 1,
+    *,
+    max_episode_steps: int | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    **arguments: Any,
+) -> VectorEnv:
     """What `gymnasium.make_vec` gives for our ids.
 
     Workers are spawned, not forked: renderers and JAX survive no fork. They build the task from its
@@ -20,16 +31,27 @@ def make_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv:
 
     Args:
       num_envs: How many; one runs in this process.
+      max_episode_steps: Truncate episodes after so many actions, as `gymnasium.make` does.
+      autoreset_mode: When an environment whose episode has ended begins the next: Gymnasium's.
       **arguments: Of `ManiPoseEnv`.
 
     Raises:
-      InputError: There would be none.
+      InputError: There would be none, or no number of them, or an option is unknown.
     """
-    if num_envs < 1:
-        raise InputError(f"num_envs is {num_envs}; expected at least 1")
+    if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+        raise InputError(f"num_envs is {num_envs}; expected a whole number, at least 1")
+    if max_episode_steps is not None and max_episode_steps < 1:
+        raise InputError(f"max_episode_steps is {max_episode_steps}; expected at least 1")
+    if autoreset_mode not in list(AutoresetMode) and autoreset_mode not in _MODES:
+        raise unknown_name("autoreset mode", str(autoreset_mode), _MODES)
     if isinstance(task := arguments.pop("task"), str):
         task = named_task(task)
-    make = partial(ManiPoseEnv, task, **arguments)
+    make = partial(_single, task, max_episode_steps, **arguments)
     if num_envs == 1:
-        return SyncVectorEnv([make])
-    return AsyncVectorEnv([make] * num_envs, context="spawn")
+        return SyncVectorEnv([make], autoreset_mode=autoreset_mode)
+    return AsyncVectorEnv([make] * int(num_envs), context="spawn", autoreset_mode=autoreset_mode)
+
+
+def _single(task: Any, max_episode_steps: int | None, **arguments: Any) -> gymnasium.Env:
+    env = ManiPoseEnv(task, **arguments)
+    return env if max_episode_steps is None else TimeLimit(env, max_episode_steps)

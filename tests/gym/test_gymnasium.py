@@ -140,8 +140,26 @@ def test_one_environment_needs_no_worker():
     many.reset(seed=0)
     many.step(many.action_space.sample())
     many.close()
-    with pytest.raises(InputError, match="num_envs is 0"):
-        gymnasium.make_vec(ID, num_envs=0)
+    for options, said in (
+        ({"num_envs": 0}, "num_envs is 0"),
+        ({"num_envs": 1.5}, "num_envs is 1.5; expected a whole number"),
+        ({"max_episode_steps": 0}, "max_episode_steps is 0"),
+        ({"autoreset_mode": "later"}, "unknown autoreset mode 'later'.*SameStep"),
+    ):
+        with pytest.raises(InputError, match=said):
+            gymnasium.make_vec(ID, **options)
+
+
+def test_several_environments_take_a_limit_and_a_way_to_begin_anew():
+    several = gymnasium.make_vec(ID, num_envs=1, max_episode_steps=2, autoreset_mode="SameStep")
+    several.reset(seed=0)
+    cut = []
+    for _ in range(4):
+        *_, truncated, infos = several.step(several.action_space.sample())
+        cut.append(truncated.tolist())
+        assert ("final_obs" in infos) == truncated.any()
+    assert cut == [[False], [True], [False], [True]]
+    several.close()
 
 
 def test_a_divergence_terminates_with_its_failure_and_the_next_episode_is_clean():
