@@ -52,7 +52,7 @@ def make(
       processes: Of the engine `c`.
       visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
       capacity: Room of the engine `warp` for contacts and constraints; without it, from a probe of the starts.
-      **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose` or both), `control_mode`, `reward_mode`,
+      **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose`, or keys of these), `control_mode`, `reward_mode`,
         `objects`, `split`, `randomisation`, `sensors`, `latency`.
 
     Raises:

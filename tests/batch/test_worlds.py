@@ -163,6 +163,16 @@ def test_processes_change_nothing(worlds):
     split.close()
 
 
+@pytest.mark.full
+def test_single_keys_are_observed(worlds):
+    some = make(TASK, worlds=1, seeds=(7,), obs_mode="panda/joint_positions+pose/handle")
+    seen = some.at([7]).observation
+    assert seen.keys() == {"panda/joint_positions", "pose/handle"}
+    for name, values in seen.items():
+        np.testing.assert_array_equal(values, worlds.at([7, 8, 7]).observation[name][:1])
+    some.close()
+
+
 def test_what_cannot_be_is_refused_in_one_line(worlds):
     for arguments, message in (
         ({"worlds": 0}, "worlds is 0"),
