@@ -6,6 +6,7 @@ no mesh outside the file's folder, no cycles.
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -17,6 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
+
+log = logging.getLogger(__name__)
 
 MAX_BYTES = 16 * 2**20
 MAX_LINKS = 2000
@@ -91,6 +94,12 @@ def read_urdf(path: Path) -> Urdf:
             raise InputError(
                 f"{path}: link {joint.child!r} hangs on two joints; expected one tree of links"
             )
+        if element.find("mimic") is not None:
+            log.warning(
+                "%s: link %r follows another joint; it is built to move on its own",
+                path,
+                joint.child,
+            )
         joints[joint.child] = joint
     return _tree(path, visuals, joints)
 
@@ -136,11 +145,18 @@ def _parse(path: Path) -> ElementTree.Element:
     return root
 
 
+def _of_scale_one(scale: str) -> bool:
+    try:
+        return [float(each) for each in scale.split()] == [1.0, 1.0, 1.0]
+    except ValueError:
+        return False
+
+
 def _visual(path: Path, element: ElementTree.Element) -> UrdfMesh:
     mesh = element.find("geometry/mesh")
     if mesh is None:
         raise InputError(f"{path}: a visual has no mesh; expected <geometry><mesh filename=.../>")
-    if mesh.get("scale", "1 1 1").split() != ["1", "1", "1"]:
+    if not _of_scale_one(mesh.get("scale", "1 1 1")):
         raise InputError(f"{path}: a mesh has scale {mesh.get('scale')!r}; expected none")
     name = _attribute(path, mesh, "filename")
     file = PurePosixPath(name)

@@ -222,6 +222,8 @@ BAD = {
     "infinite": ('<origin xyz="0.6 0 0.5"/>', '<origin xyz="inf 0 0.5"/>', "finite"),
     "limits crossed": ('lower="-0.3"', 'lower="7"', "order"),
     "not XML": ("</robot>", "", "not XML"),
+    "scale": ('obj"/>', 'obj" scale="0.001 0.001 0.001"/>', "has scale '0.001"),
+    "scale of words": ('obj"/>', 'obj" scale="one"/>', "has scale 'one'"),
 }  # fmt: skip
 
 
@@ -234,6 +236,17 @@ def test_bad_urdf_is_refused_in_one_line(case, drawn):
     with pytest.raises(InputError, match=message) as caught:
         read_urdf(urdf)
     assert str(urdf) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_scales_of_one_are_none_and_joints_that_follow_others_are_told(drawn, caplog):
+    urdf = drawn / "mobility.urdf"
+    plain, text = read_urdf(urdf), urdf.read_text()
+    text = text.replace('obj"/>', 'obj" scale="1.0 1 1.00"/>')
+    urdf.write_text(text.replace("</joint>", '<mimic joint="joint_0"/></joint>', 2))
+    assert read_urdf(urdf).visuals.keys() == plain.visuals.keys()
+    told = [each.getMessage() for each in caplog.records]
+    assert len(told) == 2 and all("is built to move on its own" in each for each in told)
+    assert "'link_0'" in told[1]
 
 
 @pytest.mark.parametrize(
