@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -95,7 +94,7 @@ def read_reply(
 
 
 def _json_in(text: str) -> Any:
-    """What a reply holds: JSON alone, or in a fence, after a thought or among prose.
+    """What a reply holds: JSON alone, or in a fence, after a thought or among prose; of several plans, the last.
 
     Raises:
       InputError: There is no JSON.
@@ -105,14 +104,21 @@ def _json_in(text: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
         mistake = str(error)[:_LONGEST]
-    decoder = json.JSONDecoder()
-    for start, _ in zip(re.finditer("{", text), range(_MOST_STARTS), strict=False):
+    decoder, last, place = json.JSONDecoder(), None, text.find("{")
+    for _ in range(_MOST_STARTS):
+        if place < 0:
+            break
         try:
-            found, _ = decoder.raw_decode(text, start.start())
+            found, end = decoder.raw_decode(text, place)
         except (ValueError, RecursionError):
-            continue
+            found, end = None, place + 1
         if isinstance(found, dict) and "plan" in found:
-            return found
+            last = found
+        else:
+            end = place + 1  # what it holds may be one
+        place = text.find("{", end)
+    if last is not None:
+        return last
     raise InputError(
         f"reply: not valid JSON ({mistake}); answer with the JSON object only, without fences or other text"
     )

@@ -46,12 +46,26 @@ def read(text: str):
         f"Here is the plan:\n{PLAIN}\nGood luck!",
         f"<think>{{maybe}} open it</think>\n{PLAIN}",
         f"The object {{top_drawer}} opens: {PLAIN}",
+        f'Nothing, {{"plan": []}}, would not do.\n{PLAIN}',
+        f'{{"answer": {PLAIN}}} is it',
         "\ufeff" + PLAIN,
         json.dumps({"plan": OPEN}),
         json.dumps({"plan": OPEN, "refusal": None}),
         json.dumps({"plan": OPEN, "refusal": "  "}),
     ],
-    ids=["plain", "fence", "prose", "thought", "braces", "mark", "no refusal", "null", "blank"],
+    ids=[
+        "plain",
+        "fence",
+        "prose",
+        "thought",
+        "braces",
+        "draft",
+        "wrapped",
+        "mark",
+        "no refusal",
+        "null",
+        "blank",
+    ],
 )
 def test_a_plan_is_found_wherever_a_model_puts_it(text):
     steps = [str(step) for step in read(text)]
