@@ -316,7 +316,9 @@ def _part_slots(goals: Sequence[Goal]) -> dict[str, str]:
 
 def _renamed(goal: Goal, parts: Mapping[str, str]) -> Goal:
     part: Any = getattr(goal, "part", None)
-    return replace(goal, part=parts[part]) if part in parts else goal  # pyright: ignore[reportArgumentType, reportCallIssue]
+    if not isinstance(part, str):
+        return goal
+    return replace(goal, part=parts[part])  # pyright: ignore[reportArgumentType, reportCallIssue]
 
 
 def _control_steps(horizon: float, timestep: float, substeps: int) -> int:

@@ -162,7 +162,7 @@ class Worlds:
             raise InputError(
                 f"hold is {hold!r}; expected a whole number of control steps from 1 on"
             )
-        self._check_shape(jnp.shape(action))
+        self.check_shape(jnp.shape(action))
         return self._step_jit(state, action, hold)
 
     def rollout(
@@ -193,7 +193,7 @@ class Worlds:
 
             def act_and_step(state: State, own: Array) -> tuple[State, Transition]:
                 action: Any = policy(state.observation, own)
-                self._check_shape(jnp.shape(action))
+                self.check_shape(jnp.shape(action))
                 after = self._step_jit(state, action, 1)
                 return after, _transition(action, after)
 
@@ -204,7 +204,7 @@ class Worlds:
             return after, _transition(action, after.state)
 
         recorded = jnp.asarray(policy)
-        self._check_shape(recorded.shape[1:])
+        self.check_shape(recorded.shape[1:])
         if steps is not None and steps > len(recorded):
             raise InputError(f"steps is {steps}; the recording has {len(recorded)} actions")
         # Nobody looks before the last step.
@@ -251,7 +251,8 @@ class Worlds:
         """Free what the engine holds."""
         self.engine.close()
 
-    def _check_shape(self, shape: tuple[int, ...]) -> None:
+    def check_shape(self, shape: tuple[int, ...]) -> None:
+        """Raises InputError where actions of this shape are not one a world."""
         expected = (self.count, len(self.lower))
         if shape != expected:
             raise InputError(f"the actions of a step have shape {shape}; expected {expected}")

@@ -91,10 +91,8 @@ class BraxWorlds:
         Raises:
           InputError: The actions have another shape.
         """
+        self.worlds.check_shape(np.shape(action))
         low, high = self.worlds.lower, self.worlds.upper
-        if np.shape(action) != (self.worlds.count, *low.shape):
-            wanted = (self.worlds.count, *low.shape)
-            raise InputError(f"actions of shape {np.shape(action)}; expected {wanted}")
         bounded = jnp.clip(action, -1.0, 1.0)
         after = self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low))
         return _as_brax(after, state.data.count + 1)

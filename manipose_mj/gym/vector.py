@@ -14,8 +14,6 @@ from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.gym.env import ManiPoseEnv
 from manipose_mj.tasks.core.registry import named_task
 
-_MODES = [mode.value for mode in AutoresetMode]
-
 
 def make_vector(
     num_envs: int = 1,
@@ -42,14 +40,17 @@ def make_vector(
         raise InputError(f"num_envs is {num_envs}; expected a whole number, at least 1")
     if max_episode_steps is not None and max_episode_steps < 1:
         raise InputError(f"max_episode_steps is {max_episode_steps}; expected at least 1")
-    if autoreset_mode not in list(AutoresetMode) and autoreset_mode not in _MODES:
-        raise unknown_name("autoreset mode", str(autoreset_mode), _MODES)
+    try:
+        autoreset = AutoresetMode(autoreset_mode)
+    except ValueError:
+        known = [mode.value for mode in AutoresetMode]
+        raise unknown_name("autoreset mode", str(autoreset_mode), known) from None
     if isinstance(task := arguments.pop("task"), str):
         task = named_task(task)
     make = partial(_single, task, max_episode_steps, **arguments)
     if num_envs == 1:
-        return SyncVectorEnv([make], autoreset_mode=autoreset_mode)
-    return AsyncVectorEnv([make] * int(num_envs), context="spawn", autoreset_mode=autoreset_mode)
+        return SyncVectorEnv([make], autoreset_mode=autoreset)
+    return AsyncVectorEnv([make] * int(num_envs), context="spawn", autoreset_mode=autoreset)
 
 
 def _single(task: Any, max_episode_steps: int | None, **arguments: Any) -> gymnasium.Env:

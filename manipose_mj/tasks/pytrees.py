@@ -7,11 +7,11 @@ subtree of arrays, which may have batch dimensions.
 
 from __future__ import annotations
 
-import contextlib
+import sys
 import types
 from collections.abc import Iterable
-from dataclasses import fields
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from dataclasses import Field, fields
+from typing import Any, Literal, Union, get_args, get_origin
 
 import jax
 
@@ -39,9 +39,8 @@ def register(cls: type) -> None:
     """Make JAX see into a frozen dataclass, such as an own goal; a second time changes nothing."""
     if cls in _registered:
         return
-    annotations = _field_types(cls)
-    static = tuple(name for name, annotated in annotations.items() if _is_static(annotated))
-    arrays = tuple(name for name in annotations if name not in static)
+    static = tuple(each.name for each in fields(cls) if _is_static(_annotation(cls, each)))
+    arrays = tuple(each.name for each in fields(cls) if each.name not in static)
 
     def flatten(node: Any) -> tuple[tuple[tuple[Any, Any], ...], tuple[Any, ...]]:
         children = tuple((jax.tree_util.GetAttrKey(name), getattr(node, name)) for name in arrays)
@@ -58,18 +57,17 @@ def register(cls: type) -> None:
     _registered.add(cls)
 
 
-def _field_types(cls: type) -> dict[str, Any]:
-    """What every field is annotated as; annotations that name nothing here stay strings."""
-    own = {field.name: field.type for field in fields(cls)}
+def _annotation(cls: type, field: Field[Any]) -> Any:
+    """What a field is annotated as; a string still where it names what is imported for type checkers only."""
+    if not isinstance(field.type, str):
+        return field.type
+    owner = next(
+        base for base in cls.__mro__ if field.name in vars(base).get("__annotations__", ())
+    )
     try:
-        known = get_type_hints(cls)
-    except (NameError, TypeError):  # names that are imported for type checkers only
-        known = {}
-        for name, annotated in own.items():
-            if isinstance(annotated, str):
-                with contextlib.suppress(Exception):
-                    known[name] = eval(annotated, {})  # of builtins alone: str, tuple[int, ...]
-    return {name: known.get(name, annotated) for name, annotated in own.items()}
+        return eval(field.type, dict(vars(sys.modules[owner.__module__])))
+    except Exception:  # whatever evaluating a stranger's annotation raises
+        return field.type
 
 
 def _is_static(annotated: Any) -> bool:

@@ -55,6 +55,6 @@ def test_keys_are_one_or_one_a_world(env):
         env.reset(jax.random.split(jax.random.key(0), 3))
     with pytest.raises(InputError, match=r"0 is no key; expected jax.random.key"):
         env.reset(0)
-    with pytest.raises(InputError, match=r"actions of shape \(2, 3\); expected \(2, "):
+    with pytest.raises(InputError, match=r"have shape \(2, 3\); expected \(2, "):
         env.step(env.reset(raw), jnp.zeros((2, 3)))
     assert env.unwrapped is env
