@@ -14,10 +14,12 @@ from manipose_mj.errors import InputError
 from manipose_mj.gym.batched import BatchedEnv
 from tests.batch.batched import make, wandering
 
+TASK = "articulated/open_middle_drawer"  # where arms begin alike, and handles are elsewhere
+
 
 @pytest.fixture(scope="module")
 def env():
-    pool = make("articulated/open_middle_drawer", 2, seeds=(7, 8), obs_mode="state").pool
+    pool = make(TASK, 2, seeds=(7, 8), obs_mode="state+pose/handle").pool
     short = replace(pool, layout=replace(pool.layout, horizon=3))
     made = BatchedEnv(batch.from_pool(short, 2, "c"))
     yield made
@@ -44,15 +46,19 @@ def test_steps_are_those_of_the_worlds_and_resets_follow_in_the_same_step(env):
 
 
 def test_a_seed_chooses_the_starts(env):
-    first = env.reset(seed=3)[0]["panda/joint_positions"]
-    np.testing.assert_array_equal(env.reset(seed=3)[0]["panda/joint_positions"], first)
+    first = env.reset(seed=3)[0]["pose/handle"]
+    np.testing.assert_array_equal(env.reset(seed=3)[0]["pose/handle"], first)
+    others = [env.reset(seed=seed)[0]["pose/handle"] for seed in range(8)]
+    assert not all(np.array_equal(other, first) for other in others)
 
 
 @pytest.mark.parametrize("form", [tuple, np.array, jnp.array])
 def test_seeds_of_the_worlds_come_in_any_sequence(env, form):
-    wanted = env.reset(seed=[8, 7])[0]["panda/joint_positions"]
-    found = env.reset(seed=form([8, 7]))[0]["panda/joint_positions"]
+    wanted = env.reset(seed=[8, 7])[0]["pose/handle"]
+    found = env.reset(seed=form([8, 7]))[0]["pose/handle"]
     np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_array_equal(env.reset(seed=[7, 8])[0]["pose/handle"], wanted[::-1])
+    assert not np.array_equal(wanted[0], wanted[1])
 
 
 def test_what_follows_seeds_of_the_worlds_follows_from_them_alone(env):
@@ -60,16 +66,16 @@ def test_what_follows_seeds_of_the_worlds_follows_from_them_alone(env):
     for before in (3, 4, 5):
         env.reset(seed=before)
         env.reset(seed=[7, 8])
-        found.append([env.reset()[0]["panda/joint_positions"] for _ in range(3)])
+        found.append([env.reset()[0]["pose/handle"] for _ in range(3)])
     np.testing.assert_array_equal(found[1], found[0])
     np.testing.assert_array_equal(found[2], found[0])
 
 
 def test_no_seed_for_each_world_is_no_seed(env):
     env.reset(seed=3)
-    wanted = env.reset()[0]["panda/joint_positions"]
+    wanted = env.reset()[0]["pose/handle"]
     env.reset(seed=3)
-    found = env.reset(seed=[None, None])[0]["panda/joint_positions"]
+    found = env.reset(seed=[None, None])[0]["pose/handle"]
     np.testing.assert_array_equal(found, wanted)
 
 

@@ -17,7 +17,9 @@ from tests.batch.batched import make
 
 @pytest.fixture(scope="module")
 def env():
-    pool = make("articulated/open_middle_drawer", 2, seeds=(7, 8), obs_mode="state").pool
+    pool = make(
+        "articulated/open_middle_drawer", 2, seeds=(7, 8), obs_mode="state+pose/handle"
+    ).pool
     short = replace(pool, layout=replace(pool.layout, horizon=3))
     made = BraxWorlds(batch.from_pool(short, 2, "c"))
     yield made
@@ -49,8 +51,11 @@ def test_a_scan_sees_what_the_worlds_do_and_where_episodes_end(env):
 
 
 def test_keys_are_one_or_one_a_world(env):
-    raw = jnp.zeros((2, 2), jnp.uint32)
-    np.testing.assert_array_equal(env.reset(raw).obs, env.reset(raw[0]).obs)
+    for number in range(6):
+        raw = jnp.array([[0, number], [0, 9]], jnp.uint32)
+        np.testing.assert_array_equal(env.reset(raw).obs, env.reset(raw[0]).obs)
+    begun = [np.asarray(env.reset(jax.random.key(number)).obs) for number in range(6)]
+    assert not all(np.array_equal(each, begun[0]) for each in begun)
     with pytest.raises(InputError, match=r"keys of shape \(3,\) for 2 worlds"):
         env.reset(jax.random.split(jax.random.key(0), 3))
     with pytest.raises(InputError, match=r"0 is no key; expected jax.random.key"):
