@@ -5,7 +5,7 @@ from __future__ import annotations
 import manifold3d
 import numpy as np
 import trimesh
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 # Of edges that two faces share, from which on a surface has an inside.
 NEARLY_CLOSED = 0.98
@@ -53,7 +53,8 @@ def open_edges(mesh: trimesh.Trimesh) -> int:
 def turn_outwards(mesh: trimesh.Trimesh) -> int:
     """Turn the faces of a (nearly) closed surface that point inwards, in place.
 
-    Seen from outside, such faces are not drawn, and the volume that they enclose counts as negative.
+    Seen from outside, such faces are not drawn, and the volume that they enclose counts as negative. The walls of
+    a cavity point into it, and stay so.
 
     Returns:
       How many faces were turned.
@@ -64,13 +65,71 @@ def turn_outwards(mesh: trimesh.Trimesh) -> int:
         return 0
     if not surface.is_winding_consistent:
         trimesh.repair.fix_winding(surface)
-    # Where it is open, the volume is that of cones from the origin.
-    surface.vertices -= surface.bounds.mean(axis=0)
-    if float(surface.volume) < 0:
-        surface.invert()
+    for piece in _pieces_inside_out(surface):
+        surface.faces[piece] = surface.faces[piece][:, ::-1]
     turned = (np.asarray(surface.faces) != before).any(axis=1)
     mesh.faces[turned] = mesh.faces[turned][:, ::-1]
     return int(turned.sum())
+
+
+def _pieces_inside_out(surface: trimesh.Trimesh) -> list[Int[np.ndarray, "faces"]]:
+    """The faces of each piece whose faces point inwards, and of what lies in it as if it were its cavity.
+
+    A piece that lies in another and points inwards is a cavity. Of one that is open nobody knows: it goes with all.
+    """
+    numbers = trimesh.graph.connected_component_labels(
+        surface.face_adjacency, node_count=len(surface.faces)
+    )
+    order = np.argsort(numbers, kind="stable")
+    pieces = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+    corners = np.asarray(surface.triangles)
+    if len(pieces) == 1:
+        return pieces if _volume(corners) < 0 else []
+    lows = np.array([corners[piece].min(axis=(0, 1)) for piece in pieces])
+    highs = np.array([corners[piece].max(axis=(0, 1)) for piece in pieces])
+    volumes = np.array([_volume(corners[piece]) for piece in pieces])
+    _, edge, counts = np.unique(
+        surface.edges_sorted, axis=0, return_inverse=True, return_counts=True
+    )
+    shared = (counts[edge.reshape(-1)] == 2).reshape(-1, 3).mean(axis=1)
+    is_closed = np.array([shared[piece].mean() >= NEARLY_CLOSED for piece in pieces])
+
+    def around(inner: int) -> list[int]:
+        """The pieces that it lies in."""
+        spans = (lows <= lows[inner]).all(axis=1) & (highs >= highs[inner]).all(axis=1)
+        spans[inner] = False
+        point = corners[pieces[inner][0], 0]
+        return [
+            i for i in np.flatnonzero(spans).tolist() if _winds_about(point, corners[pieces[i]])
+        ]
+
+    inwards = np.flatnonzero(is_closed & (volumes < 0)).tolist()
+    turned = {i for i in inwards if not around(i)}
+    if turned:
+        outwards = np.flatnonzero(is_closed & (volumes > 0)).tolist()
+        turned |= {i for i in outwards if not turned.isdisjoint(around(i))}
+    if volumes.sum() < 0:
+        turned |= set(np.flatnonzero(~is_closed).tolist())
+    return [pieces[i] for i in sorted(turned)]
+
+
+def _volume(triangles: Float[np.ndarray, "faces 3 3"]) -> float:
+    """Negative where they point inwards; where the surface is open, of cones from the middle of its bounds."""
+    middle = (triangles.min(axis=(0, 1)) + triangles.max(axis=(0, 1))) / 2
+    return float(np.linalg.det(triangles - middle).sum()) / 6
+
+
+def _winds_about(point: Float[np.ndarray, "3"], triangles: Float[np.ndarray, "faces 3 3"]) -> bool:
+    """Whether a point is inside a surface: how often that winds about it, by the solid angles of its triangles.
+
+    Source: Van Oosterom and Strackee, "The solid angle of a plane triangle", 1983.
+    """
+    to = triangles - point
+    lengths = np.linalg.norm(to, axis=2)
+    products = np.einsum("fij,fij->fi", to, np.roll(to, -1, axis=1))
+    below = lengths.prod(axis=1) + (products * np.roll(lengths, 1, axis=1)).sum(axis=1)
+    angles = 2 * np.arctan2(np.linalg.det(to), below)
+    return abs(angles.sum()) > 2 * np.pi
 
 
 def drop_flaps(mesh: trimesh.Trimesh) -> int:

@@ -2,7 +2,7 @@
 
 What the files do not say is said by who builds them (`MeshOptions`), or guessed, with a warning that names the
 guess. An object is named for its file, or for its folder where the file is called `model` or the like. The mesh
-frame is kept, scaled to metres. Nothing is claimed of where a mesh comes from.
+frame is kept, scaled to metres, but where its origin is far from the object. Nothing is claimed of where a mesh comes from.
 """
 
 from __future__ import annotations

@@ -27,6 +27,8 @@ MIN_EXTENT = 0.003
 USUAL_EXTENT = (0.01, 1.0)  # a warning is due beyond
 # The least extent over the greatest, below which nothing is solid; a sheet of paper has 3e-4.
 FLATNESS = 1e-4
+# From the origin of the frame to the object, along one axis: a free body that hangs on a long lever is unstable.
+MAX_OFFSET = 0.5
 MAX_EMPTY = 0.01  # of the faces without area; scans as published have 1e-4
 MAX_TEXTURE_PIXELS = 1024
 
@@ -124,7 +126,9 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
 
 
 def check_scan_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> None:
-    """Refuse a mesh that cannot be an object on a table; turn faces that point inwards, and say what looks damaged.
+    """Refuse a mesh that cannot be an object on a table; mend it, and say what looks damaged.
+
+    Faces that point inwards are turned, and a mesh far from the origin is moved there, axis by axis.
 
     Args:
       mesh: In metres; changed in place.
@@ -135,6 +139,11 @@ def check_scan_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> 
       InputError: As `check_mesh`.
     """
     check_mesh(mesh, where, unit=unit)
+    offset = _offset(mesh)
+    if offset.any():
+        mesh.vertices -= offset
+        moved = " ".join(f"{0.0 - each:.3g}" for each in offset)
+        log.warning("%s: the origin is far from the object; moved it by %s m", where, moved)
     if flaps := drop_flaps(mesh):
         log.warning("%s: %d faces hung on the surface by one edge only; left out", where, flaps)
     if turned := turn_outwards(mesh):
@@ -147,6 +156,13 @@ def check_scan_mesh(mesh: trimesh.Trimesh, where: str, *, unit: float = 1.0) -> 
             where,
             holes,
         )
+
+
+def _offset(mesh: trimesh.Trimesh) -> Float[np.ndarray, "3"]:
+    """Where the middle of the mesh is, along axes along which the origin is far from it; 0 along others [m]."""
+    bounds = np.asarray(mesh.bounds)
+    apart = np.maximum(bounds[0], -bounds[1])
+    return np.where(apart > MAX_OFFSET, bounds.mean(axis=0), 0.0)
 
 
 def _defects(mesh: trimesh.Trimesh) -> list[str]:

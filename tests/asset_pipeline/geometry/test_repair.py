@@ -1,11 +1,11 @@
-"""Closed surfaces: bodies that reach into one another, and cavities."""
+"""Closed surfaces: bodies that reach into one another, cavities, and pieces inside out."""
 
 import numpy as np
 import pytest
 import trimesh
 
 from asset_pipeline.geometry.convexify import convexify, fidelity
-from asset_pipeline.geometry.repair import closed
+from asset_pipeline.geometry.repair import closed, turn_outwards
 
 
 def cube(*place):
@@ -43,6 +43,39 @@ def test_cavity_stays_hollow_where_bodies_overlap():
     assert solid is not None
     # The second cube reaches through the cavity's wall and fills what it covers.
     assert 1.6 - volume < solid.volume < 1.6
+
+
+@pytest.mark.parametrize("place", [(3, 0, 0), (0.5, 0.2, 0)], ids=["apart", "overlapping"])
+@pytest.mark.parametrize("shift", [0, 40], ids=["near the origin", "far from it"])
+def test_a_piece_inside_out_is_turned_and_a_cavity_is_not(place, shift):
+    void = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
+    void.invert()
+    right = joined(cube(0, 0, 0), void, cube(*place))
+    wrong = right.copy()
+    wrong.faces[-12:] = wrong.faces[-12:, ::-1]
+    for mesh in (right, wrong):
+        mesh.apply_translation([shift, 0, 0])
+    assert turn_outwards(right.copy()) == 0
+    assert turn_outwards(wrong) == 12
+    np.testing.assert_array_equal(wrong.faces, right.faces)
+
+
+def test_a_larger_piece_inside_out_takes_the_smaller_with_it_no_more():
+    mesh = joined(cube(0, 0, 0), cube(3, 0, 0))
+    mesh.vertices[:8] *= 2
+    mesh.faces[:12] = mesh.faces[:12, ::-1]
+    assert turn_outwards(mesh) == 12
+    assert mesh.volume == pytest.approx(8 + 1)
+
+
+def test_what_is_all_inside_out_is_turned_with_its_cavity():
+    void = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
+    void.invert()
+    hollow = joined(cube(0, 0, 0), void, cube(3, 0, 0))
+    volume = hollow.volume
+    hollow.invert()
+    assert turn_outwards(hollow) == len(hollow.faces)
+    assert hollow.volume == pytest.approx(volume)
 
 
 @pytest.mark.full

@@ -209,3 +209,14 @@ def test_an_asset_of_a_category_in_another_script_is_drawn(tmp_path, capsys):
     assert main(command) == 0
     assert main(["assets", "sheet", str(tmp_path / "a"), "--out", str(tmp_path / "s")]) == 0
     assert read_asset(tmp_path / "a" / "tea").category == "杯子"
+
+
+def test_an_object_far_from_its_origin_is_moved_there_but_for_its_height(tmp_path, caplog):
+    box = trimesh.creation.box(SIZE)
+    box.apply_translation((40, -3, 0.2))
+    box.export(tmp_path / "tea_box.stl")
+    (item,) = meshes.items(tmp_path, SAID)
+    with meshes.opened(item) as scan:
+        middle = scan.mesh.bounds.mean(axis=0)
+    np.testing.assert_allclose(middle, (0, 0, 0.2), atol=1e-5)
+    assert "the origin is far from the object; moved it by -40 3 0 m" in caplog.text
