@@ -1,4 +1,4 @@
-"""Importing modules that users name, and the arguments of what is in them."""
+"""Importing modules that users name, and calling the factories in them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import importlib
 import json
 import os
 import sys
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 
 
 def search_working_folder() -> None:
@@ -30,9 +31,40 @@ def import_user_module(name: str, said_by: str) -> ModuleType:
     """
     try:
         return importlib.import_module(name)
-    except Exception as error:  # whatever a stranger's code raises
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"{said_by}: cannot import {name} ({reason[:300]})") from error
+    except (Exception, SystemExit) as error:  # whatever a stranger's code raises
+        raise InputError(f"{said_by}: cannot import {name} ({reason_of(error)})") from error
+
+
+def made_by_user(name: str, option: str, keywords: dict[str, Any], methods: tuple[str, ...]) -> Any:
+    """What a user's factory makes.
+
+    Args:
+      name: `package.module:Factory`; modules of the working folder are found too.
+      option: Of the command line that gave it, such as `--policy`.
+      keywords: The factory's arguments.
+      methods: What it makes has these.
+
+    Raises:
+      InputError: There is no such module or factory, it fails, or what it makes lacks a method.
+    """
+    said_by = f"{option} {name}"
+    factory = _factory(name, said_by)
+    try:
+        made = factory(**keywords)
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a stranger's code raises
+        raise InputError(f"{said_by}: its factory failed ({reason_of(error)})") from error
+    for method in methods:
+        if not callable(getattr(made, method, None)):
+            kind = type(made).__name__
+            raise InputError(f"{said_by}: the {kind} that it makes has no method {method}")
+    return made
+
+
+def reason_of(error: BaseException) -> str:
+    """An error of a stranger's code in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:300]
 
 
 def factory_arguments(text: str | None, option: str) -> dict[str, Any]:
@@ -54,6 +86,22 @@ def factory_arguments(text: str | None, option: str) -> dict[str, Any]:
     if not isinstance(arguments, dict):
         raise InputError(f'{option} {text}: expected a JSON object, such as {{"path": "a.pt"}}')
     return arguments
+
+
+def _factory(name: str, said_by: str) -> Callable[..., Any]:
+    module_name, _, attribute = name.partition(":")
+    if not module_name or not attribute:
+        raise InputError(f"{said_by}: expected package.module:Factory or ws://host:port")
+    search_working_folder()
+    found: Any = import_user_module(module_name, said_by)
+    for part in attribute.split("."):
+        if not hasattr(found, part):
+            public = [each for each in dir(found) if not each.startswith("_")]
+            raise unknown_name(f"attribute of {module_name}", part, public)
+        found = getattr(found, part)
+    if not callable(found):
+        raise InputError(f"{said_by}: {attribute} cannot be called; expected a class or function")
+    return found
 
 
 def _refuse(constant: str) -> None:

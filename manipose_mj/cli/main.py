@@ -71,6 +71,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(error), EXIT_INPUT)
     except WorkerDiedError as error:
         return _fail(str(error), EXIT_FAILED)
+    except MemoryError as error:
+        said = f" ({error})" if str(error) else ""
+        return _fail(f"out of memory{said}", EXIT_FAILED)
     except KeyboardInterrupt:
         return _fail("interrupted; whole results are kept", EXIT_INTERRUPTED)
     except BrokenPipeError:

@@ -92,7 +92,10 @@ def _array(
     if not isinstance(answer, Mapping) or name not in answer:
         raise EstimatorFailedError(f"answer has no {name!r}")
     try:
-        value = np.array(answer[name], float)
+        given = np.asarray(answer[name])
+        if np.iscomplexobj(given):
+            raise TypeError
+        value = np.array(given, float)
     except (TypeError, ValueError):
         raise EstimatorFailedError(f"{name} is not made of numbers") from None
     if value.shape != shape:

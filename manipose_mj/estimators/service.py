@@ -12,6 +12,7 @@ from manipose_mj.errors import ServerLostError
 from manipose_mj.estimators.answer import EstimatorFailedError, checked_answer
 from manipose_mj.estimators.observation import Observation
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
+from manipose_mj.user_code import reason_of
 from manipose_mj.wire.client import Client, RemoteFailureError
 
 
@@ -95,6 +96,7 @@ class EstimatorService:
             raise
         except EstimatorFailedError as error:
             raise EstimatorFailedError(f"estimator {self.name}: {error}") from None
-        except Exception as error:  # whatever a stranger's code raises
-            reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-            raise EstimatorFailedError(f"estimator {self.name} raised {reason}") from error
+        except (Exception, SystemExit) as error:  # whatever a stranger's code raises
+            raise EstimatorFailedError(
+                f"estimator {self.name} raised {reason_of(error)}"
+            ) from error

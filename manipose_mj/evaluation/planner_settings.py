@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from manipose_mj.control.language.address import check_address, without_secrets
+from manipose_mj.control.language.address import URL_VARIABLE, check_address, without_secrets
 from manipose_mj.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class PlannerSettings:
     Attributes:
       kind: `"rules"`: the symbolic planner; `"llm"`: a language model; `"replay"`: one's recorded answers.
       model: Name of the language model.
-      base_url: Of its endpoint; by default OpenAI's.
+      base_url: Of its endpoint; by default that of the variable `OPENAI_BASE_URL`, or OpenAI's.
       replay: File or folder of recorded exchanges.
       instruction: What a language model shall do instead of the task's goals; of a replay, by default what was
         recorded.
@@ -56,6 +56,10 @@ class PlannerSettings:
             raise InputError("base url: only --planner llm has an endpoint")
         if self.base_url is not None:
             check_address(self.base_url)
+        elif self.kind == "llm" and (address := os.environ.get(URL_VARIABLE)):
+            # Results of two endpoints are results of two methods, wherever the address stood.
+            check_address(address, URL_VARIABLE)
+            object.__setattr__(self, "base_url", address)
         for name, text in (("model", self.model), ("instruction", self.instruction)):
             if text is not None and not (text.strip() and _writable(text)):
                 raise InputError(f"{name}: {text!r}; expected words")

@@ -6,10 +6,10 @@ import math
 from functools import lru_cache
 from typing import Any
 
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError
 from manipose_mj.policies.client import RemotePolicy
 from manipose_mj.policies.protocol import Policy
-from manipose_mj.user_code import factory_arguments, import_user_module, search_working_folder
+from manipose_mj.user_code import factory_arguments, made_by_user
 from manipose_mj.wire.client import is_address
 
 
@@ -32,19 +32,7 @@ def load_policy(name: str, arguments: str | None = None) -> Policy:
         remote = RemotePolicy(name)
         remote.open()
         return remote
-    factory = _factory(name)
-    try:
-        policy = factory(**keywords)
-    except InputError:
-        raise
-    except Exception as error:  # whatever a stranger's code raises
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"--policy {name}: its factory failed ({reason[:300]})") from error
-    for method in ("reset", "infer"):
-        if not callable(getattr(policy, method, None)):
-            kind = type(policy).__name__
-            raise InputError(f"--policy {name}: the {kind} that it makes has no method {method}")
-    return policy
+    return made_by_user(name, "--policy", keywords, ("reset", "infer"))
 
 
 def metadata_of(method: object) -> dict[str, Any]:
@@ -62,22 +50,3 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     return value if isinstance(value, float) and math.isfinite(value) else str(value)
-
-
-def _factory(name: str) -> Any:
-    module_name, colon, attribute = name.partition(":")
-    if not (module_name and colon and attribute):
-        raise InputError(f"--policy {name}: expected package.module:Factory or ws://host:port")
-    search_working_folder()
-    module = import_user_module(module_name, f"--policy {name}")
-    factory: Any = module
-    for part in attribute.split("."):
-        if not hasattr(factory, part):
-            public = [each for each in dir(factory) if not each.startswith("_")]
-            raise unknown_name(f"attribute of {module_name}", part, public)
-        factory = getattr(factory, part)
-    if not callable(factory):
-        raise InputError(
-            f"--policy {name}: {attribute} cannot be called; expected a class or function"
-        )
-    return factory

@@ -76,10 +76,11 @@ def test_a_factory_gets_its_arguments():
     [
         ("no_such_module:Factory", None, "cannot import no_such_module"),
         (f"{HERE}:Midle", None, "did you mean Middle"),
-        (f"{HERE}", None, "expected package.module:factory"),
+        (f"{HERE}", None, "expected package.module:Factory"),
         (f"{HERE}:not_callable", None, "cannot be called"),
         (f"{HERE}:without_estimate", None, "the object that it makes has no method estimate"),
         (f"{HERE}:failing", None, "its factory failed (RuntimeError: no GPU)"),
+        (f"{HERE}:leaving", None, "its factory failed (SystemExit: 0)"),
         (f"{HERE}:Middle", '{"scor": 1}', "unexpected keyword"),
         (f"{HERE}:Middle", "{", "no JSON"),
         (f"{HERE}:Middle", "[1]", "expected a JSON object"),
@@ -130,6 +131,7 @@ def test_options_that_do_not_go_together(words, message, capsys):
         ({"pose": np.diag([1.0, 1.0, -1.0, 1.0]), "score": 1}, "not a rigid transform"),
         ({"pose": 2 * np.eye(4), "score": 1}, "not a rigid transform"),
         ({"pose": "here", "score": 1}, "pose is not made of numbers"),
+        ({"pose": np.eye(4) * (1 + 0j), "score": 1}, "pose is not made of numbers"),
         ({"pose": IDENTITY, "score": 2}, "score is 2; expected 0 to 1"),
         ({"pose": IDENTITY, "score": np.nan}, "score is not finite"),
         ({"pose": IDENTITY, "score": 1, "extents": [1, 0, 1]}, "extents are not positive"),
@@ -161,6 +163,8 @@ def test_an_error_of_the_estimator_names_it_in_one_line():
     with pytest.raises(EstimatorFailedError, match="estimator mine raised KeyError: ") as raised:
         EstimatorService("mine", answers.Raises()).estimate({})
     assert "\n" not in str(raised.value)
+    with pytest.raises(EstimatorFailedError, match="estimator mine raised SystemExit: 3"):
+        EstimatorService("mine", answers.Leaves()).estimate({})
 
 
 def test_a_server_answers_as_the_same_estimator_in_process_does(views):

@@ -44,6 +44,16 @@ def test_results_of_two_endpoints_do_not_belong_together():
     assert one.identity != other.identity and "key" not in str(one.identity)
 
 
+def test_an_address_from_the_variable_counts_as_one_that_was_given(monkeypatch):
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://localhost:1/v1")
+    assert PlannerSettings("llm", "m") == PlannerSettings("llm", "m", "http://localhost:1/v1")
+    assert PlannerSettings("llm", "m", "http://localhost:2/v1").base_url == "http://localhost:2/v1"
+    assert PlannerSettings().base_url is None
+    monkeypatch.setenv("OPENAI_BASE_URL", "localhost:1")
+    with pytest.raises(InputError, match="OPENAI_BASE_URL 'localhost:1': expected an address"):
+        PlannerSettings("llm", "m")
+
+
 def test_the_folder_of_an_evaluation_holds_its_exchanges(tmp_path):
     (tmp_path / "exchanges").mkdir()
     assert PlannerSettings("replay", replay=tmp_path).replay == tmp_path / "exchanges"

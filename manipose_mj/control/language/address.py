@@ -6,6 +6,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from manipose_mj.errors import InputError
 
+URL_VARIABLE = "OPENAI_BASE_URL"
 _EXAMPLE = "http://localhost:8000/v1"
 
 

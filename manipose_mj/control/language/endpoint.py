@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 from manipose_mj.control.language.address import (
+    URL_VARIABLE,
     check_address,
     no_address,
     secrets_in,
@@ -23,7 +24,6 @@ from manipose_mj.control.language.exchanges import Answer, Message, NoReplyError
 from manipose_mj.errors import InputError, how_to_install
 
 KEY_VARIABLE = "OPENAI_API_KEY"
-URL_VARIABLE = "OPENAI_BASE_URL"
 _TIMEOUT = 60.0  # [s]
 _RETRIES = 3  # after 429, 5xx and lost connections; the client waits in between
 _WITH_WAITS = 1.25  # of the time of all tries, for what lies between them

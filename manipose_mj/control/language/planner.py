@@ -32,6 +32,7 @@ from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.goals import Goal
 
+_NO_TEXT = "(no text)"  # endpoints refuse empty messages
 MAX_REPAIRS = 2
 _MOST_SENT_BACK = 20_000  # characters of a plan that is to be mended
 _TOO_LONG = "reply: it was cut off, for it is longer than an answer may be; give a shorter one"
@@ -132,7 +133,7 @@ class LanguagePlanner:
                 mistake = _TOO_LONG if answer.cut else str(error)
             messages = [
                 *messages,
-                {"role": "assistant", "content": answer.text[:_MOST_SENT_BACK]},
+                {"role": "assistant", "content": answer.text[:_MOST_SENT_BACK] or _NO_TEXT},
                 {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
             ]
         raise InputError(

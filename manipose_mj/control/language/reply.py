@@ -100,6 +100,8 @@ def _json_in(text: str) -> Any:
       InputError: There is no JSON.
     """
     text = text.rpartition(_THOUGHT)[2].strip().removeprefix("\ufeff")
+    if not text:
+        raise InputError("reply: it has no text; answer with the JSON object, and call no tool")
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -94,7 +94,7 @@ def test_a_good_plan_is_taken_and_on_record_without_the_key(serve, tmp_path):
         (UNKNOWN, "'fridge'; expected one of"),
         (UNORDERED, "release mug: the hand holds nothing"),
         ("[]", 'expected an object with the fields "plan" and "refusal"'),
-        (None, "not valid JSON"),
+        (None, "reply: it has no text"),
     ],
     ids=["prose", "unknown object", "impossible order", "other schema", "nothing"],
 )
@@ -102,7 +102,8 @@ def test_a_mistake_is_told_and_mended(serve, tmp_path, wrong, words):
     server = serve(says(wrong), says(GOOD))
     ask, path = asked(server, tmp_path)
     assert len(ask()) == 3
-    assert words in server.requests[1]["messages"][-1]["content"]
+    *_, sent_back, told = server.requests[1]["messages"]
+    assert words in told["content"] and sent_back["content"]
     assert len(read_exchanges(path)) == 2
 
 
