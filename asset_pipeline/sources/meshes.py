@@ -204,7 +204,7 @@ def opened(item: MeshItem) -> Iterator[Scan]:
         texture = None
         if found.image is not None:
             texture = Path(scratch) / "texture.png"
-            found.image.convert("RGB").save(texture)
+            found.image.save(texture)
         yield Scan(
             name=item.name,
             category=kind.category,

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from PIL import Image
 
 from asset_pipeline.geometry.repair import drop_flaps, open_edges, spikes, turn_outwards
+from asset_pipeline.sources.files.images import as_rgb, why_unreadable
 from asset_pipeline.sources.files.wavefront_lines import without_mark
 from manipose_mj.assets.asset import Provenance
 from manipose_mj.assets.label import ObjectType
@@ -244,14 +245,15 @@ def write_texture(source: Path, target: Path) -> Path:
         with Image.open(source) as image:
             image.verify()  # checksums, which reading the pixels leaves out
         with Image.open(source) as image:
-            image = image.convert("RGB")
+            image = as_rgb(image)
             image.thumbnail((MAX_TEXTURE_PIXELS, MAX_TEXTURE_PIXELS))
             image.save(target, format="PNG")
     except FileNotFoundError:
         raise InputError(f"{source}: no such file; expected the scan's texture") from None
-    except Exception as error:  # each of Pillow's readers fails in its own way
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{source}: cannot be read as an image ({reason})") from None
+    except Exception as error:
+        raise InputError(
+            f"{source}: cannot be read as an image ({why_unreadable(error)})"
+        ) from None
     return target
 
 

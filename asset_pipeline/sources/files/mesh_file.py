@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import re
 from dataclasses import dataclass
@@ -10,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from PIL import Image
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
+from trimesh.parent import Geometry
 
 from asset_pipeline.sources.files import archives
+from asset_pipeline.sources.files.images import as_rgb, why_unreadable
 from asset_pipeline.sources.files.near_files import NearFiles, colour_beside
+from asset_pipeline.sources.files.painted_surface import painted_surface
 from asset_pipeline.sources.files.ply_rows import check_rows
 from asset_pipeline.sources.files.wavefront_lines import read_lines, without_mark
 from manipose_mj.errors import InputError
@@ -26,11 +28,10 @@ ANONYMOUS = ("model", "mesh", "object", "scan", "scene", "textured", "texture", 
 METRES = {
     "meters": 1.0, "meter": 1.0, "metres": 1.0, "m": 1.0, "centimeters": 0.01, "centimeter": 0.01, "cm": 0.01,
     "millimeters": 1e-3, "millimeter": 1e-3, "mm": 1e-3, "inches": 0.0254, "inch": 0.0254, "in": 0.0254,
-    "feet": 0.3048, "foot": 0.3048, "ft": 0.3048,
+    "feet": 0.3048, "foot": 0.3048, "ft": 0.3048, "microns": 1e-6, "micron": 1e-6,
 }  # fmt: skip
-COMPRESSIONS = {b"KHR_draco_mesh_compression": "Draco", b"EXT_meshopt_compression": "meshopt"}
-LEAST_OPACITY = 0.15
-GREY = (0.7, 0.7, 0.7, 1.0)
+COMPRESSIONS = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt"}
+TRANSFORM = "KHR_texture_transform"
 
 
 @dataclass(frozen=True)
@@ -69,33 +70,39 @@ def read_mesh_file(path: Path) -> MeshFile:
     elif path.suffix.lower() == ".ply":
         check_rows(path)
     elif path.suffix.lower() in (".glb", ".gltf"):
-        _check_compression(path)
+        _check_gltf(path)
     near = NearFiles(path)
     try:
         with without_mark(path) as source:
             loaded = trimesh.load(
                 source, file_type=path.suffix[1:].lower(), resolver=near, process=False
             )
-        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:  # each of trimesh's readers fails in its own way
         log.info("%s: %s: %s", path, type(error).__name__, error)
         raise InputError(f"{path}: {_reason(path, near)}") from None
     for image, reason in near.unreadable:
         raise InputError(f"{image}: cannot be read as an image ({reason})")
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+    if not _faces(loaded):
         hint = "; is it cut off, or something else?" if path.suffix.lower() == ".stl" else ""
         raise InputError(f"{path}: holds no faces; expected a triangle surface{hint}")
-    uv = getattr(mesh.visual, "uv", None)
-    image, beside = (None, None) if uv is None else _image(mesh, path)
+    beside: list[Path] = []
+    mesh, image, rgba = painted_surface(
+        loaded,
+        lambda image: _is_placeholder(image, path),
+        lambda: _image_beside(path, beside),
+        str(path),
+    )
     if lacks := near.lacks():
-        log.warning("%s: %s; built with%s", path, lacks, f" {beside.name}" if beside else "out")
-    bare = trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), process=False)
-    if image is not None:
-        bare.visual = TextureVisuals(uv=np.nan_to_num(np.asarray(uv, float)))
-    elif np.isfinite(bare.vertices).all():  # else it is refused later
-        bare.merge_vertices()  # STL has three of its own for every face
+        log.warning("%s: %s; built with%s", path, lacks, f" {beside[0].name}" if beside else "out")
+    if image is None and np.isfinite(mesh.vertices).all():  # else it is refused later
+        mesh.merge_vertices()  # STL has three of its own for every face
     unit = _metres(str(loaded.units).lower()) if _states_unit(path) else None
-    return MeshFile(bare, image, _colour(mesh), unit, _stated_up(path))
+    return MeshFile(mesh, image, rgba, unit, _stated_up(path))
+
+
+def _faces(loaded: Geometry) -> int:
+    pieces = loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]
+    return sum(len(piece.faces) for piece in pieces if isinstance(piece, trimesh.Trimesh))
 
 
 def _reason(path: Path, near: NearFiles) -> str:
@@ -106,14 +113,36 @@ def _reason(path: Path, near: NearFiles) -> str:
     return f"cannot be read as {name}; is it cut off, or something else? Export it again"
 
 
-def _check_compression(path: Path) -> None:
-    """Of a compressed glTF trimesh reads zeros."""
-    required = re.search(rb'"extensionsRequired"\s*:\s*\[([^\]]*)\]', path.read_bytes())
+def _check_gltf(path: Path) -> None:
+    """Refuse what trimesh reads as zeros; tell of images that it puts elsewhere."""
+    data = path.read_bytes()
+    if data[:4] == b"glTF":  # 12 bytes, then the length of the document and what kind it is
+        data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+    try:
+        document = json.loads(data)
+        required = document.get("extensionsRequired", [])
+        placed = [
+            material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
+            for material in document.get("materials", [])
+        ]
+        moved = [
+            each
+            for each in placed
+            if each.get("texCoord") or TRANSFORM in each.get("extensions", {})
+        ]
+    except (ValueError, AttributeError, TypeError, RecursionError):
+        return  # trimesh will say so
     for extension, what in COMPRESSIONS.items():
-        if required and extension in required[1]:
+        if extension in required:
             raise InputError(
                 f"{path}: is compressed by {what}, which is not read; export it without compression"
             )
+    if moved:
+        log.warning(
+            "%s: images lie on it by %s or a second set of coordinates, which are not read: they will be out of "
+            "place; export it with one set of coordinates",
+            path, TRANSFORM,
+        )  # fmt: skip
 
 
 def _states_unit(path: Path) -> bool:
@@ -140,35 +169,21 @@ def _stated_up(path: Path) -> str | None:
     return stated.group(1).decode().lower() if stated else "y"
 
 
-def _image(mesh: trimesh.Trimesh, path: Path) -> tuple[Image.Image | None, Path | None]:
-    """What colours the surface, and the file where no material names it."""
-    material = getattr(mesh.visual, "material", None)
-    found = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
-    if isinstance(found, Image.Image) and not _is_placeholder(found, path):
-        return found, None
+def _image_beside(path: Path, found: list[Path]) -> Image.Image | None:
+    """The image of a mesh whose materials name none, whose file is put into `found`."""
     beside = colour_beside(path)
     if beside is None:
-        return None, None
+        return None
+    found.append(beside)
     try:
         with Image.open(beside) as image:
-            return image.convert("RGB"), beside
-    except Exception as error:  # each of Pillow's readers fails in its own way
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{beside}: cannot be read as an image ({reason})") from None
+            return as_rgb(image)
+    except Exception as error:
+        raise InputError(
+            f"{beside}: cannot be read as an image ({why_unreadable(error)})"
+        ) from None
 
 
 def _is_placeholder(image: Image.Image, path: Path) -> bool:
     """To an OBJ without a material trimesh gives a plain one of 2 x 2 pixels; those of a library say where from."""
     return path.suffix.lower() == ".obj" and max(image.size) <= 2 and "file_path" not in image.info
-
-
-def _colour(mesh: trimesh.Trimesh) -> tuple[float, float, float, float]:
-    """The material's or the vertices' main colour; grey where the file states none. Never invisible."""
-    visual = mesh.visual
-    source = getattr(visual, "material", visual)
-    if source is visual and getattr(visual, "kind", None) not in ("vertex", "face"):
-        return GREY
-    r, g, b, a = (np.asarray(getattr(source, "main_color"), float) / 255).tolist()  # noqa: B009
-    # glTF: what is not said to blend is opaque, whatever its alpha.
-    opaque = isinstance(source, PBRMaterial) and source.alphaMode not in ("BLEND", "MASK")
-    return r, g, b, 1.0 if opaque else max(a, LEAST_OPACITY)

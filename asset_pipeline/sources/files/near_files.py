@@ -14,6 +14,7 @@ from urllib.parse import quote, unquote
 from PIL import Image
 from trimesh.resolvers import Resolver
 
+from asset_pipeline.sources.files.images import why_unreadable
 from asset_pipeline.sources.files.references import leaves
 from asset_pipeline.sources.files.wavefront_lines import BYTE_ORDER_MARK
 
@@ -109,8 +110,8 @@ class NearFiles(Resolver):
         try:
             with Image.open(file) as image:
                 image.load()
-        except Exception as error:  # each of Pillow's readers fails in its own way
-            self.unreadable.append((file, (str(error).splitlines() or [type(error).__name__])[0]))
+        except Exception as error:
+            self.unreadable.append((file, why_unreadable(error)))
 
 
 def is_hidden(name: str) -> bool:
