@@ -11,6 +11,7 @@ from jaxtyping import Float
 from asset_pipeline.labelling.overrides.reading import FrameOverride, Override, PartOverride
 from asset_pipeline.labelling.scan_label import scan_label
 from manipose_mj.assets.asset import Area, Asset, MovingPart
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.geometry import MassProperties
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
@@ -19,6 +20,7 @@ from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, tr
 
 _FARTHEST = 3  # from the middle of an object its label's origin can be, in lengths of its diagonal
 _DENSEST = 22_600.0  # of all matter: osmium [kg/m^3]
+_LIGHTEST = 1.2  # air
 
 
 def overridden(
@@ -27,7 +29,8 @@ def overridden(
     """The asset with what a person said in place of what was measured.
 
     Another object type, up or functional direction has the label measured again; so has another
-    category of a tool, whose grip end it tells. Origin, axes and adjustments come after that.
+    category of a tool, whose grip end it tells, or whose catalogue type is another. Origin, axes and adjustments
+    come after that.
 
     Args:
       asset: As measured.
@@ -51,6 +54,11 @@ def overridden(
                 f"{override.where}: {unknown_name('part', name, [p.name for p in asset.parts])}"
             )
     category = override.category or asset.category
+    told = CATALOGUE.get(override.category or "")
+    if asset.kind != "articulated" and told is not None and told.object_type == "articulated":
+        raise InputError(
+            f"{override.where}: category: {category} has parts that move; expected that of a rigid object"
+        )
     up = asset.up if override.up is None else override.up
     found, quality = _measured(asset, override, surface, category, up, textured)
     label = moved(found, override.frame)
@@ -82,10 +90,17 @@ def _check_units(override: Override, label: PoseLabel, surface: trimesh.Trimesh)
         raise InputError(
             f"{override.where}: the origin is {away:.3g} m from the middle of an object of {size:.3g} m; expected metres"
         )
-    if override.mass is not None and override.mass > _DENSEST * float(surface.convex_hull.volume):
-        raise InputError(
-            f"{override.where}: mass {override.mass:g} kg is more than osmium of that size weighs; expected kilograms"
-        )
+    if override.mass is None:
+        return
+    volume = float(surface.convex_hull.volume)
+    for wrong, what in (
+        (override.mass > _DENSEST * volume, "more than osmium"),
+        (override.mass < _LIGHTEST * volume, "less than air"),
+    ):
+        if wrong:
+            raise InputError(
+                f"{override.where}: mass {override.mass:g} kg is {what} of that size weighs; expected kilograms"
+            )
 
 
 def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
@@ -127,8 +142,10 @@ def _measured(
     if asset.kind == "articulated":
         return asset.label, asset.label_quality
     object_type = override.object_type or asset.label.object_type
+    if override.object_type is None and category != asset.category and category in CATALOGUE:
+        object_type = CATALOGUE[category].object_type
     told = (override.object_type, override.up, override.functional)
-    another = any(v is not None for v in told)
+    another = any(v is not None for v in told) or object_type != asset.label.object_type
     if object_type == "functional":
         another = another or category != asset.category
     if not another:

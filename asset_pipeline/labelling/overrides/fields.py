@@ -64,8 +64,18 @@ def numbers(where: str, key: str, value: Any, shape: int | tuple[int, ...]) -> n
     if array.shape != shape or not np.isfinite(array).all() or _has_text(value):
         count = "a finite number" if shape == (1,) else f"{' x '.join(map(str, shape))} numbers"
         shown = value[0] if shape == (1,) else value
-        raise InputError(f"{where}: {key}: is {shown!r}; expected {count}")
+        raise InputError(f"{where}: {key}: is {shown!r}; expected {count}{_hint(shown)}")
     return array
+
+
+def _hint(value: Any) -> str:
+    """YAML takes `1e-3` for text."""
+    try:
+        return (
+            f": write {float(value)!r}" if isinstance(value, str) and "e" in value.lower() else ""
+        )
+    except ValueError:
+        return ""
 
 
 def _has_text(value: Any) -> bool:

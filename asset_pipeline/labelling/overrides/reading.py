@@ -48,6 +48,7 @@ from asset_pipeline.labelling.overrides.fields import (
     require_known,
     rotation_of,
 )
+from asset_pipeline.sources.categories import kind_of as category_of
 from manipose_mj.assets.label import OBJECT_TYPES, ObjectType
 from manipose_mj.assets.symmetry_names import SYMMETRIES
 from manipose_mj.errors import InputError, unknown_name
@@ -155,11 +156,7 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
         return {}
     if not isinstance(document, dict):
         raise InputError(f"{path}: holds {kind_of(document)}; expected objects' names with entries")
-    seen: set[str] = set()
-    for key, _ in root.value:
-        if key.value in seen:
-            raise InputError(f"{path}:{key.start_mark.line + 1}: {key.value} has an entry already")
-        seen.add(key.value)
+    _refuse_repeats(root, path, "an entry")
     for name, entry in document.items():
         if not isinstance(name, str):
             raise InputError(f'{path}: object {name!r} is no text; write the name in quotes: "..."')
@@ -168,6 +165,18 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
                 f"{path}: {name}: is {kind_of(entry)}; expected fields such as 'origin'"
             )
     return document
+
+
+def _refuse_repeats(node: yaml.Node, path: Path, what: str) -> None:
+    """Raises InputError where a key stands twice: YAML would take the last."""
+    if isinstance(node, yaml.MappingNode):
+        seen: set[str] = set()
+        for key, value in node.value:
+            if key.value in seen:
+                line = key.start_mark.line + 1
+                raise InputError(f"{path}:{line}: {key.value} has {what} already")
+            seen.add(key.value)
+            _refuse_repeats(value, path, "a value")
 
 
 def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
@@ -186,8 +195,11 @@ def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
             )
         raise InputError(f"{where}: object_type: {unknown_name('type', str(kind), SCAN_TYPES)}")
     category, mass = entry.get("category"), entry.get("mass")
-    if category is not None and not (isinstance(category, str) and category.strip()):
-        raise InputError(f"{where}: category: is {category!r}; expected a name such as mug")
+    if category is not None:
+        named = category_of(category).category if isinstance(category, str) else ""
+        if not named:
+            raise InputError(f"{where}: category: is {category!r}; expected a name such as mug")
+        category = named
     if mass is not None:
         mass = numbers(where, "mass", [mass], 1)[0]
         if mass <= 0:

@@ -77,7 +77,9 @@ def test_the_documented_file_is_read_and_every_documented_field_is_known(tmp_pat
         ({"object_type": "handle"}, "object_type: 'handle' cannot be chosen; expected axial"),
         ({"mass": -1}, "mass: is -1; expected a positive number"),
         ({"mass": True}, "mass: is True; expected a finite number"),
+        ({"mass": "1e-3"}, "mass: is '1e-3'; expected a finite number: write 0.001"),
         ({"category": 7}, "category: is 7; expected a name"),
+        ({"category": "../"}, "category: is '../'; expected a name"),
         ({"adjust": {"twist": [0, 0, 1]}}, "adjust: unknown field 'twist'"),
         ({"adjust": [0, 0, 1]}, "adjust: is a list; expected fields"),
         ({"parts": {"a": {}, 7: {}}}, "parts: 7 is no text; write the name in quotes"),
@@ -101,6 +103,8 @@ def test_wrong_fields_are_named_in_one_line(fields, message):
         ("12: {mass: 1}\n", "object 12 is no text; write the name in quotes"),
         ("a: 3\n", "a: is 3; expected fields"),
         ("a: {mass: 1}\na: {mass: 2}\n", "labels.yaml:2: a has an entry already"),
+        ("a: {mass: 1, mass: 2}\n", "labels.yaml:1: mass has a value already"),
+        ("a:\n  adjust: {turn: 1,\n    turn: 2}\n", "labels.yaml:3: turn has a value already"),
         ("a: !!python/object:os.system {}\n", "labels.yaml:1: not valid YAML"),
     ],
 )
@@ -192,6 +196,24 @@ def test_another_type_is_measured_anew(tmp_path):
     np.testing.assert_array_equal(held.label.origin, [0, 0, 0.05])
 
 
+def test_another_category_brings_its_type_unless_one_is_said(tmp_path):
+    asset = made.block(tmp_path / "block")
+    mesh = surface(visible_shapes(asset.folder))
+    assert asset.label.object_type == "mirror"
+
+    def told(**fields):
+        return overridden(asset, _entry(**fields), mesh, textured=True)
+
+    jar = told(category="Jar")
+    assert (jar.category, jar.label.object_type) == ("jar", "axial")
+    flat = told(category="jar", object_type="mirror")
+    assert (flat.category, flat.label.object_type) == ("jar", "mirror")
+    other = told(category="Ink-Cartridge")
+    assert (other.category, other.label) == ("ink_cartridge", asset.label)
+    with pytest.raises(InputError, match="category: cabinet has parts that move; expected that of"):
+        told(category="cabinet")
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
@@ -240,6 +262,10 @@ def test_millimetres_and_grams_are_told(tmp_path):
         ("{origin: [0, 0, 60]}", "m from the middle of an object of 0.213 m; expected metres"),
         ("{adjust: {shift: [10, 0, 0]}}", "the origin is 10"),
         ("{mass: 800}", "mass 800 kg is more than osmium of that size weighs; expected kilograms"),
+        (
+            "{mass: 1.0e-6}",
+            "mass 1e-06 kg is less than air of that size weighs; expected kilograms",
+        ),
     ):
         with pytest.raises(InputError, match=said):
             relabel(asset.folder, _file(tmp_path, f"block: {entry}\n"))
