@@ -165,11 +165,12 @@ def spikes(mesh: trimesh.Trimesh) -> int:
     edges = np.asarray(surface.edges_unique)
     lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     nearest, facing = np.full(len(points), np.inf), np.zeros(len(points))
-    total, degree = np.zeros(len(points)), np.zeros(len(points))
-    for own in edges.T:
+    total, degree, neighbours = np.zeros(len(points)), np.zeros(len(points)), np.zeros_like(points)
+    for own, other in (edges.T, edges.T[::-1]):
         np.minimum.at(nearest, own, lengths)
         np.add.at(total, own, lengths)
         np.add.at(degree, own, 1)
+        np.add.at(neighbours, own, points[other])
     for corner in range(3):
         own, after, before = (faces[:, (corner + k) % 3] for k in range(3))
         np.maximum.at(facing, own, np.linalg.norm(points[after] - points[before], axis=1))
@@ -178,8 +179,12 @@ def spikes(mesh: trimesh.Trimesh) -> int:
     for own, other in (edges.T, edges.T[::-1]):
         np.add.at(around, own, (total[other] - lengths) / np.maximum(degree[other] - 1, 1))
     around /= np.maximum(degree, 1)
+    # The middle of a fan is far from its neighbours, but in the midst of them.
+    neighbours /= np.maximum(degree, 1)[:, None]
+    sticks_out = np.linalg.norm(points - neighbours, axis=1) > nearest / 2
     # Where three faces meet the apex of a pyramid looks like a needle.
-    return int(((degree > 3) & (nearest > SPIKE * np.maximum(facing, around))).sum())
+    long = nearest > SPIKE * np.maximum(facing, around)
+    return int(((degree > 3) & long & sticks_out).sum())
 
 
 def _stitched(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

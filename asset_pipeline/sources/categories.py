@@ -9,6 +9,7 @@ read off the product's name.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from manipose_mj.assets.categories import CATALOGUE
@@ -18,6 +19,8 @@ from manipose_mj.assets.label import ObjectType
 FALLBACK_TYPE: ObjectType = "mirror"
 # Of a scanned product whose name says nothing about its shape.
 UNNAMED = "household_item"
+# Up to so many words name an object; more describe it.
+FEW_WORDS = 3
 
 
 @dataclass(frozen=True)
@@ -220,3 +223,33 @@ def kind_of_product(name: str) -> Kind:
         if f" {phrase} " in words and not measures:
             return kind_of(category or phrase)
     return kind_of(UNNAMED)
+
+
+def kind_of_file(name: str) -> Kind:
+    """What an object is, by the words of its file's name; `UNNAMED` where they say nothing.
+
+    Of a few words the last that is known counts, of a product's description the most telling.
+
+    Args:
+      name: Such as `"tea_spoon_2"`, `"mug.final"` or `"Threshold_Bead_Cardinal_Mug_Blue"`.
+    """
+    words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    by_last = next((kind for phrase in _from_the_last(words) if (kind := _known(phrase))), None)
+    return by_last if by_last and len(words) <= FEW_WORDS else kind_of_product(name)
+
+
+def _from_the_last(words: list[str]) -> Iterator[str]:
+    for end in range(len(words), 0, -1):
+        yield " ".join(words[max(end - 2, 0) : end])
+        yield words[end - 1]
+
+
+def _known(phrase: str) -> Kind | None:
+    """The rigid category that a phrase names, in the singular or the plural."""
+    products = dict(PRODUCT_WORDS)
+    for spelt in (phrase, phrase.removesuffix("s"), phrase.removesuffix("es")):
+        kind = kind_of(products.get(spelt) or spelt)
+        is_known = spelt in products or kind.category in CATALOGUE or kind.category in OTHER_TYPES
+        if is_known and kind.object_type != "articulated":
+            return kind
+    return None

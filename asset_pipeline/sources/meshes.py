@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from asset_pipeline.sources.categories import Kind, kind_of, kind_of_product
+from asset_pipeline.sources.categories import Kind, kind_of, kind_of_file
 from asset_pipeline.sources.files.mesh_file import ANONYMOUS, MeshFile, read_mesh_file
 from asset_pipeline.sources.files.near_files import MESHES, companions, is_hidden
 from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up, suits
@@ -60,6 +60,9 @@ class MeshOptions:
     licence: str | None = None
 
     def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value is not None and not isinstance(value, str):
+                raise InputError(f"--{name.replace('object_', '')} is {value!r}; expected text")
         if self.category is not None:
             kind = kind_of(self.category)
             if not kind.category:
@@ -183,7 +186,7 @@ def opened(item: MeshItem) -> Iterator[Scan]:
     mesh, guesses = found.mesh, []
     kind = kind_of(options.category or "")
     if options.category is None:
-        kind = kind_of_product(item.name)
+        kind = kind_of_file(item.name)
         guesses.append(f"category {kind.category} by its name (--category)")
     kind = Kind(kind.category, options.object_type or kind.object_type)
     unit = options.unit
@@ -239,6 +242,8 @@ def _meshes_in(folder: Path) -> list[Path]:
     found, broken, deep = [], [], []
     for pattern in ("*", "*/*"):
         for file in sorted(folder.glob(pattern)):
+            if folder.resolve().is_relative_to(file.parent.resolve()) and file.parent != folder:
+                continue  # a link back
             if _is_shown_mesh(file.relative_to(folder)):
                 if file.is_file():
                     found.append(file)

@@ -15,7 +15,7 @@ from PIL import Image
 
 from asset_pipeline.geometry.repair import drop_flaps, open_edges, spikes, turn_outwards
 from asset_pipeline.sources.files.images import as_rgb, why_unreadable
-from asset_pipeline.sources.files.wavefront_lines import without_mark
+from asset_pipeline.sources.files.wavefront_lines import for_readers
 from manipose_mj.assets.asset import Provenance
 from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError
@@ -107,7 +107,7 @@ def load_scan_mesh(path: Path, *, unit: float = 1.0) -> trimesh.Trimesh:
       InputError: The file is missing or unreadable, or its mesh cannot be an object on a table.
     """
     try:
-        with without_mark(path) as file:
+        with for_readers(path) as file:
             mesh = trimesh.load(
                 file,
                 file_type=path.suffix[1:].lower(),

@@ -48,7 +48,7 @@ def read_results(path: Path) -> list[Estimate]:
       InputError: The file is missing, lacks a column, or a line holds no estimate; one line says which.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             found = list(_estimates(path, csv.reader(file)))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None

@@ -147,6 +147,7 @@ class EvaluationConfig:
     def _check_errors(self) -> None:
         """Refuse errors that nobody would notice."""
         errors = self.errors
+        errors.check()
         if self.policy is None:
             if errors.of_cameras and self.pose == "oracle":
                 raise InputError(

@@ -29,9 +29,6 @@ class InjectedErrors:
       latency_ms: By how much servo targets come late.
       assume_upright: The baseline takes every object that it does not hold to stand upright, as one that knows
         no orientations would.
-
-    Raises:
-      InputError: A number is negative or not finite.
     """
 
     pose_error_cm: float = 0.0
@@ -43,7 +40,9 @@ class InjectedErrors:
     latency_ms: float = 0.0
     assume_upright: bool = False
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Raises InputError where a number is negative or not finite."""
+        # Not when it is made: the parser of the command line would tell that in a frame of its own.
         for name, value in vars(self).items():
             if isinstance(value, int | float) and not 0 <= value < math.inf:
                 raise InputError(f"{_option(name)} is {value}; expected 0 or more")

@@ -18,7 +18,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.articulated.model import ArticulatedModel, estimate_furniture
 from manipose_mj.ppf_jax.compilation_cache import keep_compiled
 from manipose_mj.ppf_jax.data.articulated.clouds import CLOUD_POINTS
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.weight_files import load_weights
 
@@ -149,6 +149,7 @@ def estimate_rows(
     upwards = np.asarray(up, np.float32)
     if upwards.shape != (3,) or not np.isfinite(upwards).all() or not upwards.any():
         raise InputError(f"up is {up}; expected a direction, three numbers not all zero")
+    seeds_of(key)
     checked = []
     for number, cloud in enumerate(clouds):
         try:
@@ -192,8 +193,7 @@ def checked_furniture(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, n
     points, normals = checked_cloud(
         cloud, fewest=MIN_POINTS, shortest=_SHORTEST, longest=_LONGEST, what="furniture"
     )
-    seed = np.asarray(jax.random.key_data(key)).ravel()
-    rows = np.random.default_rng(seed).permutation(len(points))[:CLOUD_POINTS]
+    rows = np.random.default_rng(seeds_of(key)).permutation(len(points))[:CLOUD_POINTS]
     points, normals = points[rows], None if normals is None else normals[rows]
     if normals is None:
         return points, cloud_normals(points)

@@ -25,7 +25,7 @@ from manipose_mj.ppf_jax.confidence import (
     calibration_in,
     scores_of,
 )
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.outlier_removal import not_alone
@@ -155,6 +155,7 @@ class PoseEstimator:
         """
         if len(clouds) == 0:
             return []
+        seeds_of(key)
         checked = []
         for number, cloud in enumerate(clouds):
             try:
@@ -259,12 +260,12 @@ def _sample_rows(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray)
 
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:
     """At most `MAX_POINTS` points and their unit normals, towards the camera; None without any."""
+    seeds = seeds_of(key)
     points, normals = checked_cloud(
         cloud, fewest=MIN_POINTS, shortest=SHORTEST, longest=LONGEST, what="an object"
     )
     if len(points) > MAX_POINTS:
-        seed = np.asarray(jax.random.key_data(key)).ravel()
-        rows = np.random.default_rng(seed).permutation(len(points))[:MAX_POINTS]
+        rows = np.random.default_rng(seeds).permutation(len(points))[:MAX_POINTS]
         points, normals = points[rows], None if normals is None else normals[rows]
     if normals is None:
         kept = not_alone(points)

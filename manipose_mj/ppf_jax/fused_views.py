@@ -24,7 +24,7 @@ from manipose_mj.ppf_jax.estimator import (
     filled,
     scores_found,
 )
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
@@ -96,7 +96,7 @@ class FusedViewEstimator:
           InputError: There is not one frame a cloud, a cloud cannot be used, all see too little together, or the
             networks have learnt from single cameras.
         """
-        rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).ravel())
+        rng = np.random.default_rng(seeds_of(key))
         cloud, T_common_camera = fused_cloud(clouds, T_common_camera, rng=rng)
         found = self.estimate_fused(cloud, key=key)
         others = tuple(_moved(each, T_common_camera) for each in found.hypotheses)
@@ -106,6 +106,7 @@ class FusedViewEstimator:
         self, clouds: Sequence[FusedCloud | LabelledCloud], *, key: PRNGKeyArray
     ) -> list[PoseEstimate]:
         """`estimate_fused` of each; errors as there."""
+        seeds_of(key)
         keys = jax.random.split(key, len(clouds)) if clouds else ()
         return [
             self.estimate_fused(cloud, key=own) for cloud, own in zip(clouds, keys, strict=True)
@@ -135,7 +136,7 @@ class FusedViewEstimator:
                 "networks that have learnt from one camera; expected such as "
                 "PoseEstimator.load(name, cameras='several')"
             )
-        rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).ravel())
+        rng = np.random.default_rng(seeds_of(key))
         rows = rng.permutation(len(cloud.points))[: model.config.sample]
         points, mask = filled(cloud.points[rows], model.config.sample)
         origins = np.zeros_like(cloud.points) if cloud.eyes is None else cloud.eyes

@@ -19,7 +19,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import invert
 from manipose_mj.ppf_jax.confidence import Scores, alike, scores_of
 from manipose_mj.ppf_jax.estimator import PoseEstimator, distinct_first, prepared_sample
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, seeds_of
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.evidence import Evidence
 from manipose_mj.ppf_jax.rigid.model import PoseModel, estimate_with_evidence, score_poses
@@ -117,6 +117,7 @@ def score_together(
             f"{len(clouds)} clouds and camera frames of shape {frames.shape}; expected one or more, "
             "and a 4x4 frame each"
         )
+    seeds_of(key)
     poses, extents, penalty, leads, seen = [], [], [], [], []
     for number, (cloud, frame) in enumerate(zip(clouds, frames, strict=True)):
         own = jax.random.fold_in(key, number)

@@ -38,14 +38,19 @@ def data(tmp_path_factory):
     return folder
 
 
-def scored(data, lines, tmp_path) -> dict[str, dict]:
+def scored(data, lines, tmp_path, encoding="utf-8") -> dict[str, dict]:
     path = tmp_path / "estimates.csv"
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding=encoding)
     rows = score(read_results(path), read_data(data), source=path)
     return {str(row["name"]): row for row in rows}
 
 
 RECALLS = ("mssd", "mspd", "add_s", "recall_5deg_2cm", "recall_10deg_5cm")
+
+
+def test_a_table_from_a_spreadsheet_is_read(data, tmp_path):
+    lines = write_truth(data, tmp_path / "truth.csv")
+    assert scored(data, lines, tmp_path) == scored(data, lines, tmp_path, encoding="utf-8-sig")
 
 
 def test_truth_scores_one(data, tmp_path):

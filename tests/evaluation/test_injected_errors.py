@@ -90,7 +90,14 @@ def test_what_nobody_would_notice_is_refused(tmp_path, errors, changes, said):
 @pytest.mark.parametrize("value", [-1.0, float("inf"), float("nan")])
 def test_sizes_are_finite_and_not_negative(value):
     with pytest.raises(InputError, match="--pose-error-cm is"):
-        InjectedErrors(pose_error_cm=value)
+        InjectedErrors(pose_error_cm=value).check()
+
+
+def test_a_negative_size_is_one_line_of_the_command(tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["evaluate", "single_object/target_pose", "--latency-ms", "-5", "--out", str(out)]
+    assert main(words) == 2 and not out.exists()
+    assert capsys.readouterr().err == "manipose: --latency-ms is -5.0; expected 0 or more\n"
 
 
 def test_a_card_says_which_errors_were_made():

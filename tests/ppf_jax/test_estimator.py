@@ -13,6 +13,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
+from manipose_mj.ppf_jax.points.cloud_input import Cloud
 from manipose_mj.ppf_jax.rigid.model import ModelConfig, PoseModel, estimate_sample
 from manipose_mj.ppf_jax.rigid.voting import VotingConfig
 from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
@@ -142,6 +143,28 @@ def test_normals_must_fit_the_points(trained, mug):
     short = dataclasses.replace(mug, normals=mug.normals[:-1])
     with pytest.raises(InputError, match="normals of shape"):
         PoseEstimator(trained).estimate(short, key=KEY)
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_points_and_normals_make_a_cloud_and_a_pair_of_them_does_not(trained, mug):
+    estimator = PoseEstimator(trained)
+    same = estimator.estimate(Cloud(mug.points, mug.normals), key=KEY)
+    np.testing.assert_array_equal(same.pose, estimator.estimate(mug, key=KEY).pose)
+    for pair in ((mug.points, mug.normals[:-1]), np.concatenate([mug.points, mug.normals], axis=1)):
+        with pytest.raises(InputError, match=r"or with normals a Cloud\(points, normals\)"):
+            estimator.estimate(pair, key=KEY)
+
+
+@pytest.mark.parametrize("key", [0, None, "seed"])
+@pytest.mark.usefixtures("wrong_arrays")
+def test_what_is_no_key_is_one_line(trained, mug, key):
+    estimator = PoseEstimator(trained)
+    for ask in (
+        lambda: estimator.estimate(mug, key=key),
+        lambda: estimator.estimate_many([mug], key=key),
+    ):
+        with pytest.raises(InputError, match="key is .*; expected one such as jax.random.key"):
+            ask()
 
 
 def test_names_without_weights(monkeypatch, tmp_path):

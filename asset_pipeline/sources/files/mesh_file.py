@@ -18,7 +18,7 @@ from asset_pipeline.sources.files.images import as_rgb, why_unreadable
 from asset_pipeline.sources.files.near_files import NearFiles, colour_beside
 from asset_pipeline.sources.files.painted_surface import painted_surface
 from asset_pipeline.sources.files.ply_rows import check_rows
-from asset_pipeline.sources.files.wavefront_lines import read_lines, without_mark
+from asset_pipeline.sources.files.wavefront_lines import for_readers, read_lines
 from manipose_mj.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ def read_mesh_file(path: Path) -> MeshFile:
         _check_gltf(path)
     near = NearFiles(path)
     try:
-        with without_mark(path) as source:
+        with for_readers(path) as source:
             loaded = trimesh.load(
                 source, file_type=path.suffix[1:].lower(), resolver=near, process=False
             )

@@ -16,7 +16,7 @@ from trimesh.resolvers import Resolver
 
 from asset_pipeline.sources.files.images import why_unreadable
 from asset_pipeline.sources.files.references import leaves
-from asset_pipeline.sources.files.wavefront_lines import BYTE_ORDER_MARK
+from asset_pipeline.sources.files.wavefront_lines import BYTE_ORDER_MARK, plain_lines
 
 # Of the formats that trimesh reads, those of surfaces.
 MESHES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae", ".off", ".3mf")
@@ -58,7 +58,7 @@ class NearFiles(Resolver):
             raise FileNotFoundError(key)
         data = file.read_bytes()
         if file.suffix.lower() == _LIBRARY:
-            return data.removeprefix(BYTE_ORDER_MARK)
+            return plain_lines(data.removeprefix(BYTE_ORDER_MARK))
         if file.suffix.lower() not in _NO_IMAGES:
             self._take_image(file)
         return data

@@ -72,7 +72,7 @@ def read_lines(path: Path, *, max_bytes: int) -> WavefrontLines:
       InputError: Missing or too large; a line cannot be read; a face has less than 3 corners or names
         what is not there; a vertex is NaN or infinite.
     """
-    text = read_text(path, max_bytes=max_bytes)
+    text = plain_lines(read_text(path, max_bytes=max_bytes).encode()).decode()
     reader = _Reader()
     for number, line in enumerate(text.split("\n"), start=1):
         keyword, _, rest = line.strip().partition(" ")
@@ -97,10 +97,19 @@ def read_text(path: Path, *, max_bytes: int) -> str:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
+def plain_lines(data: bytes) -> bytes:
+    """Lines as every reader takes them: they end with a newline, go on in no other, and have blanks for tabs."""
+    data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data.replace(b"\\\n", b" ").replace(b"\t", b" ")
+
+
 @contextmanager
-def without_mark(path: Path) -> Iterator[BinaryIO]:
-    """A file, open behind its byte order mark, which would hide the first line from a reader."""
+def for_readers(path: Path) -> Iterator[BinaryIO]:
+    """A file, open behind its byte order mark, which would hide the first line; an OBJ file with plain lines."""
     with path.open("rb") as file:
+        if path.suffix.lower() == ".obj":
+            yield io.BytesIO(plain_lines(file.read().removeprefix(BYTE_ORDER_MARK)))
+            return
         if file.read(len(BYTE_ORDER_MARK)) != BYTE_ORDER_MARK:
             file.seek(0)
             yield file

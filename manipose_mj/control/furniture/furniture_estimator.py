@@ -23,7 +23,7 @@ from manipose_mj.ppf_jax.articulated_estimator import (
     checked_furniture,
     estimate_rows,
 )
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, Cloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, Cloud, seeds_of
 
 _LEANS = 0.5  # cosine between the body's own up and that of the camera, at least
 
@@ -91,6 +91,7 @@ class FurnitureEstimator:
             raise InputError(
                 f"{len(clouds)} clouds and {len(categories)} categories; expected one each"
             )
+        seeds_of(key)
         checked = []
         for number, cloud in enumerate(clouds):
             try:

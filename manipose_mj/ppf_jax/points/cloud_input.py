@@ -1,10 +1,11 @@
-"""What estimators take: a cloud in metres, with normals or without, checked before anything is done with it."""
+"""What estimators take: a cloud in metres, with normals or without, and a key, checked before anything is done."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -49,10 +50,15 @@ def checked_cloud(
       InputError: Too few points, wrong shape, not finite, or not in metres.
     """
     oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
-    points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
+    points: np.ndarray
+    try:
+        points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
+    except ValueError:  # rows of several lengths
+        points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
         raise InputError(
-            f"cloud of shape {points.shape} and type {points.dtype}; expected numbers, (points, 3)"
+            f"cloud of shape {points.shape} and type {points.dtype}; expected numbers, (points, 3), or with normals "
+            "a Cloud(points, normals)"
         )
     normals = np.asarray(cloud.normals) if oriented else None  # pyright: ignore[reportAttributeAccessIssue]
     if normals is not None and normals.shape != points.shape:
@@ -75,3 +81,15 @@ def checked_cloud(
             f"cloud about {1000 * span:.2g} mm across: {fault}; expected the surface of {what} in metres"
         )
     return points.astype(np.float32), normals
+
+
+def seeds_of(key: Any) -> np.ndarray:
+    """The numbers in a JAX key; every estimator asks for them before it draws.
+
+    Raises:
+      InputError: It is none.
+    """
+    try:
+        return np.asarray(jax.random.key_data(key)).ravel()
+    except TypeError:
+        raise InputError(f"key is {key!r}; expected one such as jax.random.key(0)") from None

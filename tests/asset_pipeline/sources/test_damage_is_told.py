@@ -195,6 +195,13 @@ def test_sharp_corners_are_no_needles():
     assert spikes(cone.subdivide().subdivide()) == 0
 
 
+def test_the_middle_of_a_fan_is_no_needle():
+    profile = np.array(
+        [[0, 0], [0.03, 0.004], [0.05, 0.03], [0.048, 0.03], [0.029, 0.006], [0, 0.002]]
+    )
+    assert spikes(trimesh.creation.revolve(profile, sections=64)) == 0
+
+
 REAL = {
     "ycb": ("ycb/030_fork_google_16k.tgz", None),
     "google_scanned_objects": ("google_scanned_objects.tar.xz", "Room_Essentials_Salad_Plate_Turquoise"),

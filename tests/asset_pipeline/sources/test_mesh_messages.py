@@ -220,3 +220,22 @@ def test_an_object_far_from_its_origin_is_moved_there_but_for_its_height(tmp_pat
         middle = scan.mesh.bounds.mean(axis=0)
     np.testing.assert_allclose(middle, (0, 0, 0.2), atol=1e-5)
     assert "the origin is far from the object; moved it by -40 3 0 m" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [(b" ", b"\t"), (b"\n", b"\r"), (b"\n", b"\r\n"), (b" 0", b" \\\n0")],
+    ids=["tabs", "old lines of macOS", "lines of Windows", "lines that go on"],
+)
+def test_obj_files_are_read_however_their_lines_are_written(tmp_path, written, instead, caplog):
+    path = tmp_path / "box.obj"
+    trimesh.creation.box(SIZE).export(path)
+    path.write_bytes(path.read_bytes().replace(written, instead))
+    np.testing.assert_allclose(read_mesh_file(path).mesh.extents, SIZE, atol=1e-6)
+    assert caplog.records == []
+
+
+def test_a_folder_that_links_to_itself_is_read_once(tmp_path):
+    _box(tmp_path / "mug.stl")
+    (tmp_path / "self").symlink_to(tmp_path)
+    assert _names(tmp_path) == ["mug"]

@@ -14,9 +14,10 @@ from PIL import Image
 
 from asset_pipeline.build.data_set import build
 from asset_pipeline.sources import meshes
-from asset_pipeline.sources.categories import kind_of_product
+from asset_pipeline.sources.categories import kind_of_file
 from asset_pipeline.sources.mesh_guesses import AXES, UNITS, guess_unit, guess_up
 from asset_pipeline.sources.meshes import MeshOptions
+from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from tests.places import REAL_DATA
@@ -138,7 +139,7 @@ def test_guesses_are_right_for_nearly_all_real_scans(tmp_path):
     ups, units = [], []
     for file in sorted(tmp_path.glob("**/model.obj")):
         mesh = trimesh.load(file, force="mesh", process=False, skip_materials=True)
-        kind = kind_of_product(file.parent.name)
+        kind = kind_of_file(file.parent.name)
         ups.append(guess_up(mesh, kind.object_type) == "z")
         mesh.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], [0, 1, 0]))
         ups.append(guess_up(mesh, kind.object_type) == "y")
@@ -147,6 +148,33 @@ def test_guesses_are_right_for_nearly_all_real_scans(tmp_path):
             with contextlib.suppress(InputError):  # it asks: that is no wrong guess
                 units.append(guess_unit(longest, kind.category) == unit)
     assert len(ups) > 200 and np.mean(ups) > 0.97 and np.mean(units) > 0.99
+
+
+@pytest.mark.parametrize(
+    ("name", "category"),
+    [
+        ("mug2", "mug"),
+        ("mug.final", "mug"),
+        ("TeaSpoon_silver", "spoon"),
+        ("wine_glass", "wine_glass"),
+        ("power_drill_v3", "drill"),
+        ("green_bottles", "bottle"),
+        ("can_opener", "can_opener"),
+        ("toothbrushes", "toothbrush"),
+        ("oven", "household_item"),
+        ("thing_007", "household_item"),
+        ("Tea_spoon_with_a_long_description_of_a_box", "box"),
+    ],
+)
+def test_the_last_word_that_is_known_tells_the_category(name, category):
+    assert kind_of_file(name).category == category
+
+
+def test_every_rigid_category_is_known_by_its_own_name():
+    for name, category in CATALOGUE.items():
+        found = kind_of_file(f"my_{name}_01")
+        if category.object_type != "articulated":
+            assert (found.category, found.object_type) == (name, category.object_type)
 
 
 def test_a_size_that_suits_in_no_unit_asks_for_the_unit(tmp_path):
@@ -185,6 +213,7 @@ def test_up_is_what_the_file_states_where_the_shape_does_not_tell():
         ({"up": "Z"}, "unknown axis 'Z'"),
         ({"unit": "mmm"}, "unknown unit 'mmm'; did you mean mm"),
         ({"unit": "-1"}, "expected a number of metres above 0"),
+        ({"category": 5}, "--category is 5; expected text"),
         ({"object_type": "articulated"}, "unknown type 'articulated'"),
     ],
 )
