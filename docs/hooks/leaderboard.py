@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,11 @@ def _method(text: str) -> str:
     return _cell(line.removeprefix(METHOD))
 
 
+def _text(said: str) -> str:
+    """What somebody said, as Markdown that is neither HTML nor a link; as cards have it."""
+    return re.sub(r"[\[\]<>]", lambda found: f"\\{found[0]}", said)
+
+
 def _cell(text: str) -> str:
     """Text that ends no cell of a table."""
     return text.replace("|", "\\|")
@@ -52,9 +58,10 @@ def _row(card: dict[str, Any], run: dict[str, Any], method: str) -> str:
     protocol = json.loads((PROTOCOLS / f"{run['protocol']}.json").read_text(encoding="utf-8"))
     covered = f"{len(run['tasks'])} of {len(protocol['tasks'])}"
     url = card["code_url"]
-    name = f"[{card['name']}]({url})" if url.startswith("https://") else card["name"]
+    name = _text(card["name"])
+    name = f"[{name}]({url})" if url.startswith("https://") else name
     return (
         f"| {_cell(name)} | {run['protocol']}, {seeds} | {covered} | {episodes} | "
         f"{run['mean_success_at_end']:.1%} | {run['mean_success_once']:.1%} | {method} | "
-        f"{_cell(card['training_data'])} |"
+        f"{_cell(_text(card['training_data']))} |"
     )

@@ -66,7 +66,8 @@ class InjectedErrors:
             elif isinstance(value, list):
                 words += [_option(name), *value]
             else:
-                words += [_option(name), f"{value:g}"]
+                short = f"{value:g}"
+                words += [_option(name), short if float(short) == value else repr(value)]
         return words
 
     @property

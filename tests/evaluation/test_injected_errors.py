@@ -93,6 +93,11 @@ def test_sizes_are_finite_and_not_negative(value):
         InjectedErrors(pose_error_cm=value).check()
 
 
+def test_words_say_every_digit():
+    assert InjectedErrors(pose_error_cm=1.23456789).words == ["--pose-error-cm", "1.23456789"]
+    assert InjectedErrors(pose_error_cm=2.0).words == ["--pose-error-cm", "2"]
+
+
 def test_a_negative_size_is_one_line_of_the_command(tmp_path, capsys):
     out = tmp_path / "out"
     words = ["evaluate", "single_object/target_pose", "--latency-ms", "-5", "--out", str(out)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -76,7 +78,8 @@ def evaluate_pose(
     if foreign is not None and (weights is not None or labels == "original"):
         raise InputError("--weights and --labels are of the package's estimator; leave them out")
     if foreign is not None:
-        own, asked = None, ForeignViews(foreign, setting, views)
+        with redirect_stdout(sys.stderr):  # what a stranger's code prints is no table, nor JSON
+            own, asked = None, ForeignViews(foreign, setting, views)
     elif weights is None:
         if labels == "original":
             raise InputError("the package's weights are of unified labels; give --weights FILE")
@@ -97,7 +100,8 @@ def evaluate_pose(
         if assets is not None and labels == "original":
             raise InputError("--assets have unified labels only; leave out --labels original")
         if asked is not None:
-            clouds, found = asked.predictions(category, split, assets)
+            with redirect_stdout(sys.stderr):
+                clouds, found = asked.predictions(category, split, assets)
         elif assets is not None:
             clouds = asset_clouds(assets, name, view_setting(setting), views=views, jobs=jobs)
         else:

@@ -34,6 +34,8 @@ _NAMES = {
     "response_format": "response_format|json_schema|json_object"
 }  # of a parameter, if several
 _NOT_TAKEN = (400, 422)  # status of what an endpoint does not take
+# A question that is too long is as long without a parameter, though the refusal may list them.
+_TOO_LONG = r"context[ _](length|window|size)|too long|too many tokens|maximum .{0,20}tokens"
 
 
 class EndpointModel:
@@ -152,6 +154,8 @@ class EndpointModel:
 
     def _ask_for_less(self, parameter: str, said: str) -> bool:
         """Leave out the parameter that a refusal names; whether it names one."""
+        if parameter not in self.parameters and re.search(_TOO_LONG, said, re.IGNORECASE):
+            return False
         for text in (parameter, said):
             for name in tuple(self.parameters):
                 if re.search(rf"\b({_NAMES.get(name, name)})\b", text, re.IGNORECASE):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,15 +16,20 @@ def card_markdown(card: Mapping[str, Any]) -> str:
     """The text of `card.md`."""
     code = card["code_url"]
     lines = [
-        f"# {card['name']}",
+        f"# {as_text(card['name'])}",
         "",
         f"- Code: {code if code == OWN_CODE else f'<{code}>'}",
-        f"- Training data: {card['training_data']}",
+        f"- Training data: {as_text(card['training_data'])}",
         f"- Method: {method_text(card['method'])}",
     ]
     for run in card["runs"]:
         lines += ["", *_run_lines(run)]
     return "\n".join(lines) + "\n"
+
+
+def as_text(said: str) -> str:
+    """What somebody said, as Markdown that is neither HTML nor a link."""
+    return re.sub(r"[\[\]<>]", lambda found: f"\\{found[0]}", said)
 
 
 def _coverage(run: Mapping[str, Any]) -> str:

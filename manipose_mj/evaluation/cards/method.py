@@ -45,7 +45,8 @@ def method_of(run: Mapping[str, Any]) -> dict[str, Any]:
         "assets sha256": run["assets sha256"],
     }
     # What a run leaves at its default, older runs do not know.
-    chosen = {name: run[name] for name in ("injected errors", "grasps") if run.get(name)}
+    later = ("injected errors", "grasps", "estimator metadata")
+    chosen = {name: run[name] for name in later if run.get(name)}
     return {**method, **chosen}
 
 

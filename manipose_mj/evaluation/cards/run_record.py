@@ -55,6 +55,7 @@ _FORMS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     ),
     "assets sha256": ("null or a text", lambda value: isinstance(value, str | None)),
     "injected errors": ("null or an object", lambda value: isinstance(value, dict | None)),
+    "estimator metadata": ("null or an object", lambda value: isinstance(value, dict | None)),
     "grasps": ("null or a name", lambda value: isinstance(value, str | None)),
 }
 

@@ -202,6 +202,17 @@ def test_a_refusal_of_something_else_is_told_with_its_reason(serve, tmp_path):
         ask()
 
 
+def test_a_question_that_is_too_long_leaves_nothing_out(serve, tmp_path):
+    long = (
+        "This model's maximum context length is 4096 tokens; lower seed, temperature or the schema"
+    )
+    server = serve(refuses("messages", long), says(GOOD))
+    ask, _ = asked(server, tmp_path)
+    with pytest.raises(InputError, match="status 400: This model's maximum context length"):
+        ask()
+    assert len(ask()) == 3 and {"seed", "temperature"} <= server.requests[-1].keys()
+
+
 def raw(body: str, kind: str = "application/json"):
     return lambda handler: send(handler, 200, body)
 

@@ -352,6 +352,7 @@ def edit_run(card: Path, **changes) -> None:
         ),
         ({"batch": {"engine": "warp", "worlds": 2}}, "engine: None"),
         ({"assets sha256": "ab"}, "assets sha256: None"),
+        ({"estimator metadata": {"weights": "b"}}, "estimator metadata is missing"),
     ],
 )
 def test_methods_that_differ_in_more_than_poses_are_two(

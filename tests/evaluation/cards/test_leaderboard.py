@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from manipose_mj.evaluation.cards.card import check_card
+from manipose_mj.evaluation.cards.markdown import as_text
 from manipose_mj.evaluation.cards.method import method_text
 from tests.places import ROOT
 
@@ -57,6 +58,16 @@ def test_bars_in_what_makers_say_end_no_cell(hook):
     run = json.loads((CARDS[0] / "card.json").read_text(encoding="utf-8"))["runs"][0]
     row = hook._row(card, run, "method")
     assert row.startswith("| [a\\|b](https://a.org/) | ") and row.endswith(" | c \\| d |")
+
+
+def test_what_makers_say_is_neither_html_nor_a_link(hook):
+    said = "<b>x</b> [here](https://b.org)"
+    card = {"name": said, "code_url": "https://a.org/", "training_data": said}
+    run = json.loads((CARDS[0] / "card.json").read_text(encoding="utf-8"))["runs"][0]
+    row = hook._row(card, run, "method")
+    escaped = r"\<b\>x\</b\> \[here\](https://b.org)"
+    assert row.count(escaped) == 2 and row.count("<b>") == 0
+    assert as_text(said) == escaped
 
 
 def test_other_pages_stay_as_they_are(hook):

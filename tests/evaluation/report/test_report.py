@@ -99,6 +99,21 @@ def test_page_says_what_was_run(page: str, evaluation: Path) -> None:
         assert version in page.replace("<span>", "")
 
 
+@pytest.mark.parametrize(
+    ("resample", "starts"), [(None, "frozen starts"), (7, "starts resampled from 7")]
+)
+def test_page_of_a_protocol_names_it(tmp_path, monkeypatch, resample, starts):
+    monkeypatch.setattr(film, "STILL_SIZE", (30, 40))
+    for name in ("WITHOUT_GL", "WITH_GL"):
+        small = Playback(height=30, width=40, fps=2.0)
+        monkeypatch.setattr(f"manipose_mj.evaluation.report.html.{name}", small)
+    task = ("single_object/target_pose",)
+    config = EvaluationConfig(task, tmp_path, episodes=1, protocol="v1", resample=resample)
+    evaluate(config, runner=fake.make_runner())
+    page = write_report(tmp_path, scene=fake.scene).read_text(encoding="utf-8")
+    assert f"protocol v1, {starts}" in " ".join(page.split()) and "base seed" not in page
+
+
 def test_each_kind_of_ending_has_its_strip(page: str, evaluation: Path) -> None:
     results, _ = read_results(evaluation / "results.jsonl")
     kinds = {(r.task, r.failure) for r in results}
