@@ -27,6 +27,11 @@ FULL_TURN = 2 * np.pi
 MOVES = ("revolute", "prismatic", "continuous")
 MIN_TRAVEL = {"slide": 5e-4, "hinge": np.deg2rad(1.0)}  # [m, rad]; less is as good as fixed
 MAX_SIZE = 4.0  # [m]
+_ROUNDED = 0.01  # what a whole turn may be written as more than it is
+_SMALLER = 0.999  # boxes that differ by less are alike
+_BOTH_SIDES = (
+    0.1  # of a range on either side of where a part is drawn, from which on that is no slip
+)
 DOOR_TRAVEL = np.pi / 2  # of a door whose limits nobody stated
 
 
@@ -113,6 +118,13 @@ def placed_links(
     for link in moving:
         placed = _scaled(link, scale, foot)
         assert placed.joint is not None
+        if placed.joint.kind == "slide" and placed.joint.travel > whole.max():
+            raise InputError(
+                f"link {link.name!r} slides by {placed.joint.travel:.3g} m, farther than the object of "
+                f"{whole.max():.3g} m is long; expected its own depth at most"
+            )
+        if placed.joint.kind == "slide" and link.role == "drawer" and placed.joint.axis[0] > 0.5:
+            log.warning("link %r slides out towards the back; is its axis reversed?", link.name)
         if placed.joint.travel < MIN_TRAVEL[placed.joint.kind]:
             log.warning("link %r moves by %g only; taken as fixed", link.name, placed.joint.travel)
             frozen += link.parts
@@ -181,11 +193,15 @@ def _role(
 def _shut(
     link: ScanLink, joint: UrdfJoint, frame: Float[np.ndarray, "4 4"], base: ScanLink
 ) -> ScanLink:
-    """The link at the limit that is shut, its axis turned so that positive opens.
+    """The link where it is shut, its axis turned so that positive opens.
 
     Of a door's or a drawer's two limits, the one where link and base share the smaller bounding box is
-    shut; of the others, and where the boxes are alike, the lower one. A door without limits is shut as drawn and
-    opens by a quarter turn, the way that takes it farther out of the base.
+    shut; of the others, and where the boxes are alike, the lower one. A door that is drawn well between them is shut
+    as drawn, and so is a drawer whose box is smaller there than at both; then a drawer opens towards the front, and a
+    door the way that takes it farther out of the base. So does a door without limits, by a quarter turn.
+
+    Raises:
+      InputError: It would turn by more than a whole turn.
     """
     kind: Literal["slide", "hinge"] = "slide" if joint.kind == "prismatic" else "hinge"
     origin, axis = frame[:3, 3], frame[:3, :3] @ joint.axis
@@ -196,12 +212,35 @@ def _shut(
         return float(np.prod(both[:, 1].max(axis=0) - both[:, 0].min(axis=0)))
 
     lower, upper = joint.limits or (0.0, FULL_TURN)
+    if kind == "hinge" and upper - lower > (1 + _ROUNDED) * FULL_TURN:
+        raise InputError(
+            f"link {link.name!r} turns from {lower:g} to {upper:g} rad; expected a whole turn at most: degrees?"
+        )
     start, sign = lower, 1.0
     if link.role in ("door", "lid") and joint.limits is None:
         upper = DOOR_TRAVEL
         sign = 1.0 if box(upper) >= box(-upper) else -1.0
-    elif link.role in ("door", "drawer", "lid") and box(upper) < 0.999 * box(lower):
-        start, sign = upper, -1.0
+    elif link.role in ("door", "drawer", "lid"):
+        least = _SMALLER * min(box(lower), box(upper))
+        if min(-lower, upper) > _BOTH_SIDES * (upper - lower) and (
+            kind == "hinge" or box(0.0) < least
+        ):
+            log.warning(
+                "link %r moves to both sides of where it is drawn: taken to be shut there",
+                link.name,
+            )
+            out = box(upper) - box(lower) if kind == "hinge" else -axis[0]
+            start, sign = 0.0, 1.0 if out >= 0 else -1.0
+            lower, upper = (0.0, upper) if sign > 0 else (lower, 0.0)
+        elif box(upper) < _SMALLER * box(lower):
+            start, sign = upper, -1.0
+        if box(0.0) < _SMALLER * box(start):
+            log.warning(
+                "link %r is never as shut as it is drawn: it moves from %g to %g",
+                link.name,
+                lower,
+                upper,
+            )
     joint_of = LinkJoint(kind, origin, sign * axis, upper - lower)
     return replace(_turned(link, kind, origin, axis, start), joint=joint_of)
 

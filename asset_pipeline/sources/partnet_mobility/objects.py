@@ -21,7 +21,7 @@ from asset_pipeline.sources import collection
 from asset_pipeline.sources.articulated_scan import ArticulatedScan, ScanLink
 from asset_pipeline.sources.partnet_mobility.links import normalised_links, placed_links
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_links
-from asset_pipeline.sources.partnet_mobility.sizes import BODIES, SIZES, CategorySize
+from asset_pipeline.sources.partnet_mobility.sizes import BODIES, SIZES, TABLE, CategorySize
 from asset_pipeline.sources.partnet_mobility.urdf import read_urdf
 from asset_pipeline.sources.scan import ScanItem
 from manipose_mj.assets.asset import Provenance
@@ -131,8 +131,14 @@ def _semantics(folder: Path) -> dict[str, Semantics]:
 def _size(folder: Path, semantics: dict[str, Semantics]) -> CategorySize:
     meta = _json(folder / "meta.json")
     category = meta.get("model_cat") if isinstance(meta, dict) else None
+    by_body = next((BODIES[s.name] for s in semantics.values() if s.name in BODIES), None)
+    if None not in (category, by_body) and by_body != category and (category, by_body) != TABLE:
+        log.warning(
+            "%s: the category is %s, but the body that of %s; the size is that of the category",
+            folder / "meta.json", category, by_body,
+        )  # fmt: skip
     if category is None:
-        category = next((BODIES[s.name] for s in semantics.values() if s.name in BODIES), None)
+        category = by_body
         log.warning(
             "%s: does not say the category; by semantics.txt it is %s",
             folder / "meta.json",

@@ -101,9 +101,12 @@ def _placements(urdf: Urdf) -> Iterator[str]:
     """Visuals that are not, with every joint at zero, where they were drawn."""
     top = next((j.pose for j in urdf.joints.values() if j.parent == urdf.root), np.eye(4))
     for link, visuals in urdf.visuals.items():
-        for visual in visuals if link != urdf.root else ():
-            if not _near(pose_of(urdf.chain(link)) @ visual.pose, top):
-                yield f"mesh {visual.file} of link {link!r} is not where it was drawn; an origin is wrong"
+        if link == urdf.root:
+            continue
+        off = [v.file for v in visuals if not _near(pose_of(urdf.chain(link)) @ v.pose, top)]
+        if off:
+            more = f" and {len(off) - 1} more" if len(off) > 1 else ""
+            yield f"mesh {off[0]}{more} of link {link!r} is not where it was drawn; an origin is wrong"
 
 
 def _semantics(urdf: Urdf, semantics: dict[str, Semantics]) -> Iterator[str]:

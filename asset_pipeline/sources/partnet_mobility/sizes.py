@@ -80,6 +80,8 @@ SIZES: dict[str, CategorySize] = {
     "Refrigerator": CategorySize("refrigerator", (Build(width=Length(0.60)),), appliance=True),
     "WashingMachine": CategorySize("washing_machine", (Build(width=Length(0.60)),), appliance=True),
 }
+# The body of tables is called that of furniture, too.
+TABLE = ("Table", "StorageFurniture")
 # What the heavy link is called where `meta.json` does not say the category.
 BODIES = {
     "microwave_body": "Microwave",

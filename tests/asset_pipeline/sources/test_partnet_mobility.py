@@ -147,6 +147,39 @@ def test_limits_whose_upper_end_is_shut_are_reversed(drawn):
     assert drawer.travel == pytest.approx(0.7 * SCALE)
 
 
+DOOR_LIMIT, DRAWER_LIMIT = 'lower="0" upper="1.5707963"', 'lower="-0.3" upper="0.4"'
+
+
+def with_limit(drawn: Path, before: str, after: str) -> Path:
+    urdf = drawn / "mobility.urdf"
+    urdf.write_text(urdf.read_text().replace(before, after))
+    return drawn
+
+
+def test_a_door_that_swings_both_ways_is_shut_as_drawn(drawn, caplog):
+    whole = read(drawn)
+    both = read(with_limit(drawn, DOOR_LIMIT, 'lower="-1.5" upper="1.5707963"'))
+    assert "'link_0' moves to both sides of where it is drawn: taken to be shut" in caplog.text
+    for one, other in zip(whole.moving, both.moving, strict=True):
+        np.testing.assert_allclose(one.joint.axis, other.joint.axis, atol=1e-9)
+        assert one.joint.travel == other.joint.travel
+
+
+def test_ranges_that_nothing_has_are_refused(drawn):
+    with pytest.raises(InputError, match="'link_1' slides by 9.69 m, farther than the object"):
+        read(with_limit(drawn, DRAWER_LIMIT, 'lower="0" upper="30"'))
+    with pytest.raises(InputError, match="'link_0' turns from 0 to 90 rad; .* degrees?"):
+        read(with_limit(drawn, DOOR_LIMIT, 'lower="0" upper="90"'))
+
+
+def test_ranges_that_are_odd_are_told(drawn, caplog):
+    read(with_limit(drawn, DOOR_LIMIT, 'lower="0.5" upper="1.5"'))
+    assert "'link_0' is never as shut as it is drawn: it moves from 0.5 to 1.5" in caplog.text
+    (drawn / "meta.json").write_text(json.dumps({"model_cat": "Microwave"}))
+    read(drawn)
+    assert "the category is Microwave, but the body that of StorageFurniture" in caplog.text
+
+
 def test_boards_become_exact_boxes_and_overlapping_parts_do_not_jam(asset):
     result = check_asset(asset.folder)
     assert result.ok, result.failures
