@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
 import jax
@@ -41,7 +42,7 @@ class CEngine:
           processes: That step them; one: this one.
 
         Raises:
-          InputError: There would be none.
+          InputError: There would be none, or they do not start.
         """
         if processes < 1:
             raise InputError(f"processes is {processes}; expected at least 1")
@@ -54,14 +55,10 @@ class CEngine:
         if self._local is None:
             # One executor a process: a world stays with the process that has its data.
             self._workers = [
-                ProcessPoolExecutor(
-                    max_workers=1,
-                    mp_context=get_context("spawn"),
-                    initializer=_begin,
-                    initargs=(pool, len(chunk)),
-                )
-                for chunk in self._chunks
+                ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
+                for _ in self._chunks
             ]
+            _begin_all(self._workers, pool, self._chunks)
         self._one = pool.starts[0].measurement
         shapes = jax.ShapeDtypeStruct
         self._shapes = (
@@ -142,6 +139,29 @@ class CEngine:
         ]
         parts = [future.result() for future in waiting]
         return jax.tree.map(lambda *each: np.concatenate(each), *parts)
+
+
+def _begin_all(workers: list[ProcessPoolExecutor], pool: StartPool, chunks: list[range]) -> None:
+    """Gives every process its worlds.
+
+    Raises:
+      InputError: One does not start.
+    """
+    # Not as the executors' initialisers: the whole pool would be written to a process that may be gone by then.
+    begun = [
+        worker.submit(_begin, pool, len(chunk))
+        for worker, chunk in zip(workers, chunks, strict=True)
+    ]
+    try:
+        for each in begun:
+            each.result()
+    except BrokenProcessPool:
+        for worker in workers:
+            worker.shutdown(wait=False, cancel_futures=True)
+        raise InputError(
+            "processes: they do not start; each runs your script anew, whose own work has to stand under "
+            'if __name__ == "__main__":'
+        ) from None
 
 
 def _single(advanced: Advanced) -> Advanced:

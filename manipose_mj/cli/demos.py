@@ -144,6 +144,11 @@ def replay_demos(
             f"{lost(results)} successes lost",
             soft_wrap=True,
         )
+        if out is None and not changed and same < len(results):
+            names = ", ".join(
+                f"traj_{each.episode.episode_id}" for each in results if not each.identical
+            )
+            notes.print(f"{demos.path}: not bit for bit: {names}", soft_wrap=True)
         worst = max(worst, int(out is None and not changed and same < len(results)))
     return worst
 

@@ -213,16 +213,22 @@ def find_sets(path: Path) -> list[DemoSet]:
       InputError: There is none, or a file is broken.
     """
     if path.is_file() or path.suffix == ".h5":
-        return [read_set(path)]
+        return [_not_empty(read_set(path))]
     files = sorted([*path.glob("trajectory.*.h5"), *path.glob("*/trajectory.*.h5")])
     if not files:
         raise InputError(f"{path}: holds no demonstrations (trajectory.*.h5)")
     recorded = {file.parent for file in files if file.name == recorded_name()}
     return [
-        read_set(file)
+        _not_empty(read_set(file))
         for file in files
         if file.parent not in recorded or file.name == recorded_name()
     ]
+
+
+def _not_empty(demos: DemoSet) -> DemoSet:
+    if not demos.episodes:
+        raise InputError(f"{demos.path.with_suffix('.json')}: describes no episode")
+    return demos
 
 
 def read_set(path: Path) -> DemoSet:
@@ -253,12 +259,30 @@ def read_set(path: Path) -> DemoSet:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"{description}: no description of demonstrations ({reason})") from None
+    _check(demos, description)
     with reading(path) as file:
         missing = [e.episode_id for e in episodes if f"traj_{e.episode_id}" not in file]
     if missing:
         raise InputError(f"{path}: lacks traj_{missing[0]}, which {description.name} describes")
     refuse_frozen(demos.task, (episode.episode_seed for episode in episodes))
     return demos
+
+
+def _check(demos: DemoSet, where: Path) -> None:
+    """Raises InputError where the environment or the numbers of episodes are not those of demonstrations."""
+    given = demos.env_kwargs
+    kwargs = given if isinstance(given, dict) else {}
+    objects, ids = kwargs.get("objects", ""), [episode.episode_id for episode in demos.episodes]
+    listed = isinstance(objects, list) and all(isinstance(each, str) for each in objects)
+    if not (objects is None or listed):
+        said = repr(objects) if "objects" in kwargs else "missing"
+        raise InputError(
+            f"{where}: env_kwargs: objects is {said}; expected null or a list of names"
+        )
+    if not isinstance(kwargs.get("split"), str):
+        raise InputError(f"{where}: env_kwargs: split is {kwargs.get('split')!r}; expected a name")
+    if twice := [each for each in ids if ids.count(each) > 1]:
+        raise InputError(f"{where}: describes episode {twice[0]} twice")
 
 
 @contextmanager
@@ -289,5 +313,10 @@ def read_actions(demos: DemoSet, episode: DemoEpisode) -> Float[np.ndarray, "t n
         raise InputError(
             f"{demos.path}: traj_{episode.episode_id} has actions of shape {actions.shape}; expected "
             f"{episode.elapsed_steps}"
+        )
+    if not np.isfinite(actions).all():
+        step = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+        raise InputError(
+            f"{demos.path}: traj_{episode.episode_id} has an action that is not finite, of step {step}"
         )
     return actions

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -144,6 +145,19 @@ def record(
     Raises:
       InputError: The folder holds demonstrations and `resume` is False, or others; or the baseline fails too often.
     """
+    new = [folder for folder in (config.parts, config.folder, config.out) if not folder.exists()]
+    try:
+        return _record(config, resume, on_progress)
+    except InputError:
+        if config.parts in new and not any(config.parts.glob("[0-9]*")):
+            shutil.rmtree(config.parts, ignore_errors=True)
+            for folder in new[1:]:
+                with suppress(OSError):  # somebody else writes there
+                    folder.rmdir()
+        raise
+
+
+def _record(config: RecordConfig, resume: bool, on_progress: Callable[[int, int], None]) -> DemoSet:
     seeds = config.seeds()
     planned: list[tuple[int, int]] = []
     if config.path.exists():

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +15,7 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch
+from manipose_mj.batch.engine_c import _begin_all
 from manipose_mj.errors import InputError
 from tests.batch.batched import make, wandering
 
@@ -161,6 +166,20 @@ def test_processes_change_nothing(worlds):
     state = worlds.at([7, 8, 7])
     equal(split.step(split.at([7, 8, 7]), action), worlds.step(state, action))
     split.close()
+
+
+class Deadly:
+    """Ends the process that unpickles it, as a script without a guard does."""
+
+    def __reduce__(self):
+        return os._exit, (1,)
+
+
+@pytest.mark.full
+def test_processes_that_do_not_start_are_one_line():
+    executor = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
+    with pytest.raises(InputError, match="own work has to stand under if __name__"):
+        _begin_all([executor], cast(Any, Deadly()), [range(1)])
 
 
 @pytest.mark.full

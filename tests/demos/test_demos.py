@@ -12,6 +12,7 @@ import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -190,6 +191,16 @@ def test_a_task_that_the_baseline_cannot_do_ends_with_one_line(tmp_path, monkeyp
         record(config(tmp_path))
 
 
+def test_what_is_refused_before_the_first_attempt_leaves_nothing(tmp_path, monkeypatch):
+    def refused(config, number, seed):
+        raise InputError("no such object")
+
+    monkeypatch.setattr(recording, "_attempt", refused)
+    with pytest.raises(InputError, match="no such object"):
+        record(config(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
 def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
     frozen = frozen_seeds(TASK)
     assert len(frozen) == 100 + 50  # of v1, and of its list of real scans
@@ -219,6 +230,12 @@ READERS = {
         (lambda path: path.with_suffix(".json").unlink(), "no description of demonstrations"),
         (lambda path: path.with_suffix(".json").write_text("{}"), "KeyError: 'env_info'"),
         (lambda path: path.with_suffix(".json").write_text('{"env_'), "no description"),
+        (lambda path: _edit(path, env_kwargs={}), "objects is missing; expected null or a list"),
+        (lambda path: _edit(path, env_kwargs=None), "objects is missing; expected null or a list"),
+        (lambda path: _edit(path, objects="box_000"), "objects is 'box_000'; expected null or a l"),
+        (lambda path: _edit(path, split=3), "split is 3; expected a name"),
+        (lambda path: _edit(path, episodes=0), "describes no episode"),
+        (lambda path: _edit(path, episodes=3), "describes episode 0 twice"),
         (lambda path: _without(path, "traj_1"), "lacks traj_1"),
         (lambda path: _without(path, "traj_0/actions"), "no whole HDF5 file"),
         (lambda path: _without(path, "traj_0/actions", 5), r"has actions of shape \(5, 8\)"),
@@ -234,6 +251,19 @@ def test_broken_files_are_one_line_and_exit_code_2(copied, damage, said, reader,
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and re.search(said, lines[0])
     assert reader == "play" or not out.exists()
+
+
+def _edit(path: Path, **changes: Any) -> None:
+    """Change the description: the first `episodes`, of which there are two, and of the environment all else."""
+    description = path.with_suffix(".json")
+    document = json.loads(description.read_text())
+    if "episodes" in changes:
+        document["episodes"] = (2 * document["episodes"])[: changes["episodes"]]
+    elif "env_kwargs" in changes:
+        document["env_info"] |= changes
+    else:
+        document["env_info"]["env_kwargs"] |= changes
+    description.write_text(json.dumps(document))
 
 
 def _without(path: Path, name: str, kept: int = 0) -> None:

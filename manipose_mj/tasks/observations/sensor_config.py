@@ -13,6 +13,7 @@ from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight
 from manipose_mj.mjcf.cameras.pictures import ENGINES, Engine
 from manipose_mj.tasks.observations.fixed_error import FixedError
 
+MAX_PIXELS = 8192  # along a side of a picture
 DEPTH_MODELS: dict[str, StructuredLight | None] = {"ideal": None, "structured_light": KINECT}
 
 
@@ -108,6 +109,21 @@ class SensorConfig:
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) or value < 1:
                 raise InputError(f"sensors: {name} is {value!r}; expected a positive whole number")
+        for name in ("height", "width"):
+            if getattr(self, name) > MAX_PIXELS:
+                raise InputError(
+                    f"sensors: {name} is {getattr(self, name)}; expected at most {MAX_PIXELS} pixels"
+                )
+        kinds = {
+            "depth_model": (str, StructuredLight),
+            "pose_noise": (PoseNoise,),
+            "pose_error": (FixedError,),
+            "camera_error": (FixedError,),
+        }
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                expected = " or ".join("a name" if k is str else f"a {k.__name__}" for k in kind)
+                raise InputError(f"sensors: {name} is {getattr(self, name)!r}; expected {expected}")
         if isinstance(self.cameras, str) or not isinstance(self.cameras, Sequence):
             raise InputError(f"sensors: cameras is {self.cameras!r}; expected a tuple of cameras")
         names = self.camera_names

@@ -71,6 +71,7 @@ def test_unknown_modes_and_keys_are_refused_with_the_nearest(observations, near)
         ({"cameras": ()}, "need a camera"),
         ({"height": 0}, "height is 0"),
         ({"width": 2.5}, "width is 2.5"),
+        ({"width": 100_000}, "width is 100000; expected at most 8192 pixels"),
         ({"object_cloud_size": -1}, "object_cloud_size is -1"),
         ({"depth_model": "kinect"}, "unknown depth model 'kinect'; known: ideal, structured_light"),
         ({"renderer": "rays"}, "did you mean ray"),
