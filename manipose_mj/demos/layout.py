@@ -22,6 +22,7 @@ from jaxtyping import Float
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.protocol import VERSIONS
+from manipose_mj.evaluation.protocol.own_assets import digest_of_objects
 from manipose_mj.evaluation.records import write_atomically
 from manipose_mj.evaluation.statistics import versions
 from manipose_mj.gym.registration import env_id
@@ -213,21 +214,28 @@ def find_sets(path: Path) -> list[DemoSet]:
       InputError: There is none, or a file is broken.
     """
     if path.is_file() or path.suffix == ".h5":
-        return [_not_empty(read_set(path))]
+        return [_playable(read_set(path))]
     files = sorted([*path.glob("trajectory.*.h5"), *path.glob("*/trajectory.*.h5")])
     if not files:
         raise InputError(f"{path}: holds no demonstrations (trajectory.*.h5)")
     recorded = {file.parent for file in files if file.name == recorded_name()}
     return [
-        _not_empty(read_set(file))
+        _playable(read_set(file))
         for file in files
         if file.parent not in recorded or file.name == recorded_name()
     ]
 
 
-def _not_empty(demos: DemoSet) -> DemoSet:
+def _playable(demos: DemoSet) -> DemoSet:
+    """Raises InputError where there is no episode, or the user's objects were built anew since."""
+    where = demos.path.with_suffix(".json")
     if not demos.episodes:
-        raise InputError(f"{demos.path.with_suffix('.json')}: describes no episode")
+        raise InputError(f"{where}: describes no episode")
+    digest = demos.assets_sha256
+    if digest is not None and digest != digest_of_objects(demos.env_kwargs["objects"]):
+        raise InputError(
+            f"{where}: its objects were built otherwise; build them as they were, or record anew"
+        )
     return demos
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from manipose_mj.demos import record as recording
-from manipose_mj.demos.layout import read_actions, read_set
+from manipose_mj.demos.layout import find_sets, read_actions, read_set
 from manipose_mj.demos.record import record
 from manipose_mj.errors import InputError
 from tests.demos.recordings import attempting, config
@@ -97,6 +97,9 @@ def test_a_set_of_other_builds_is_not_extended(tmp_path, monkeypatch):
     objects = {"objects": (str(tmp_path / "assets"),)}
     record(config(tmp_path / "out", episodes=1, **objects))
     assert len(record(config(tmp_path / "out", episodes=2, **objects), resume=True).episodes) == 2
+    assert len(find_sets(tmp_path / "out")) == 1
     asset.write_text('{"schema_version": 1, "name": "mug", "provenance": {"generator": "two"}}')
     with pytest.raises(InputError, match="its objects were built otherwise"):
         record(config(tmp_path / "out", episodes=3, **objects), resume=True)
+    with pytest.raises(InputError, match="its objects were built otherwise; build them as they"):
+        find_sets(tmp_path / "out")

@@ -16,12 +16,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import compose
 
 log = logging.getLogger(__name__)
 
 MAX_BYTES = 16 * 2**20
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+LARGEST_ANGLE = 2 * np.pi + 0.01  # of an origin [rad]
 MAX_LINKS = 2000
 
 
@@ -167,6 +169,8 @@ def _visual(path: Path, element: ElementTree.Element) -> UrdfMesh:
 
 def _joint(path: Path, element: ElementTree.Element) -> UrdfJoint:
     kind = _attribute(path, element, "type")
+    if kind not in JOINT_TYPES:
+        raise InputError(f"{path}: {unknown_name('type of a joint', kind, JOINT_TYPES)}")
     parent, child = element.find("parent"), element.find("child")
     if parent is None or child is None:
         raise InputError(f"{path}: a joint lacks its <parent> or <child>; expected both")
@@ -198,6 +202,9 @@ def _pose(path: Path, origin: ElementTree.Element | None) -> Float[np.ndarray, "
     if origin is None:
         return np.eye(4)
     rpy = _vector(path, origin, "rpy")
+    if np.abs(rpy).max() > LARGEST_ANGLE:
+        said = " ".join(f"{angle:g}" for angle in rpy)
+        raise InputError(f"{path}: an origin is turned by {said} rad; expected a turn: degrees?")
     return compose(Rotation.from_euler("xyz", rpy).as_matrix(), _vector(path, origin, "xyz"))
 
 

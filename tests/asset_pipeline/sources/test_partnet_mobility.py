@@ -229,9 +229,7 @@ def test_missing_mesh_is_skipped_until_a_link_has_none(drawn, caplog):
     (drawn / "textured_objs" / "original-0.obj").unlink()  # the door's panel
     assert len(read(drawn).moving[0].parts) == 1
     assert "original-0.obj" in caplog.text
-    (drawn / "textured_objs" / "original-1.obj").write_text(
-        "v 0 0 0\nl 1 1\n"
-    )  # nothing but a line
+    (drawn / "textured_objs" / "original-1.obj").write_text("v 0 0 0\nl 1 1\n")  # only a line
     for index in range(2, len(DOOR)):
         (drawn / "textured_objs" / f"original-{index}.obj").unlink()
     with pytest.raises(InputError, match="none of the 4 meshes of link 'link_0'"):
@@ -253,6 +251,8 @@ BAD = {
     "unknown link": ('<child link="link_1"/>', '<child link="link_9"/>', "'link_9'"),
     "no number": ('lower="-0.3"', 'lower="shut"', "'shut'"),
     "infinite": ('<origin xyz="0.6 0 0.5"/>', '<origin xyz="inf 0 0.5"/>', "finite"),
+    "joint type": ('"revolute"', '"Revolute"', "unknown type of a joint 'Revolute'; did you mean"),
+    "degrees": ('rpy="1.570796326794897 0 ', 'rpy="90 0 ', "turned by 90 0 -1.5708 rad; .*degrees"),
     "limits crossed": ('lower="-0.3"', 'lower="7"', "order"),
     "not XML": ("</robot>", "", "not XML"),
     "scale": ('obj"/>', 'obj" scale="0.001 0.001 0.001"/>', "has scale '0.001"),
