@@ -6,6 +6,7 @@ import hashlib
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -30,6 +31,7 @@ MOST_REPEATS = 8  # of an image across a face, in a packed image
 LEAST_TINT = 0.1
 
 Colour = tuple[float, float, float, float]
+Box = tuple[int, int, int, int]  # of an image, in pixels: left, top, right, bottom
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Paint:
     rgba: Colour
     image: Image.Image | None = None
 
-    @property
+    @cached_property
     def key(self) -> tuple[Colour, bytes]:
         """The same for paints that look the same."""
         if self.image is None:
@@ -182,42 +184,54 @@ def _packed(
     plain_from = PACKED_PIXELS if not plain else 0
     if plain and images:
         plain_from = round(PACKED_PIXELS * (1 - PLAIN_SHARE))
-    places = [*_cells(len(images), 0, plain_from), *_cells(len(plain), plain_from, PACKED_PIXELS)]
-    boxes = dict(zip((paint.key for paint in (*images, *plain)), places, strict=True))
-    for paint in plain:
-        r, g, b, _ = paint.rgba
-        sheet.paste((round(255 * r), round(255 * g), round(255 * b)), boxes[paint.key])
+    boxes = [*_cells(len(images), 0, plain_from), *_cells(len(plain), plain_from, PACKED_PIXELS)]
     placed = []
-    for paint in paints:
+    for paint, box in zip((*images, *plain), boxes, strict=True):
         own = [piece for piece in pieces if piece.paint.key == paint.key]
-        box = boxes[paint.key]
-        if paint.image is None:
-            middle = _in_sheet(np.array([[0.5, 0.5]]), box)
-            placed += [
-                _Piece(p.vertices, p.faces, np.repeat(middle, len(p.vertices), axis=0), paint)
-                for p in own
-            ]
-            continue
-        turned = [_within_repeats(piece) for piece in own]
-        reach = max(float(piece.uv.max()) for piece in turned if piece.uv is not None)
-        repeats = max(int(np.ceil(reach - 1e-6)), 1)
-        if repeats > MOST_REPEATS:
-            log.warning(
-                "%s: an image repeats %d times across a face; drawn as if %d times",
-                where, repeats, MOST_REPEATS,
-            )  # fmt: skip
-        inner = (box[0] + MARGIN, box[1] + MARGIN, box[2] - MARGIN, box[3] - MARGIN)
-        _paste(sheet, _tiled(paint.tinted(), min(repeats, MOST_REPEATS), inner), inner)
-        placed += [
-            _Piece(p.vertices, p.faces, _in_sheet(p.uv / repeats, inner), paint)
-            for p in turned
-            if p.uv is not None
-        ]
+        placed += (
+            _in_colour(own, box, sheet)
+            if paint.image is None
+            else _in_image(own, box, sheet, where)
+        )
     return _with_uv(placed), sheet
 
 
-def _cells(count: int, top: int, bottom: int) -> list[tuple[int, int, int, int]]:
-    """Boxes of about equal size in rows of the sheet, in pixels: left, top, right, bottom."""
+def _in_colour(own: list[_Piece], box: Box, sheet: Image.Image) -> list[_Piece]:
+    """Pieces of a plain colour, which fills a box of the sheet."""
+    paint = own[0].paint
+    r, g, b, _ = paint.rgba
+    sheet.paste((round(255 * r), round(255 * g), round(255 * b)), box)
+    middle = _in_sheet(np.array([[0.5, 0.5]]), box)
+    return [
+        _Piece(p.vertices, p.faces, np.repeat(middle, len(p.vertices), axis=0), paint) for p in own
+    ]
+
+
+def _in_image(own: list[_Piece], box: Box, sheet: Image.Image, where: str) -> list[_Piece]:
+    """Pieces with an image, which lies in a box of the sheet as often as it repeats across a face."""
+    turned = [(piece, *_within_repeats(piece)) for piece in own]
+    reach = max(float(uv.max()) for _, _, _, uv in turned)
+    repeats = max(int(np.ceil(reach - 1e-6)), 1)
+    if repeats > MOST_REPEATS:
+        log.warning(
+            "%s: an image repeats %d times across a face; drawn as if %d times",
+            where, repeats, MOST_REPEATS,
+        )  # fmt: skip
+    left, top, right, bottom = box
+    margin = min(MARGIN, (right - left) // 4, (bottom - top) // 4)
+    inner = (left + margin, top + margin, right - margin, bottom - margin)
+    image = _tiled(own[0].paint.tinted(), min(repeats, MOST_REPEATS), inner)
+    # Smaller pictures of the sheet mix what is around the image into it.
+    around = np.pad(np.asarray(image), ((margin, margin), (margin, margin), (0, 0)), mode="edge")
+    sheet.paste(Image.fromarray(around), (left, top))
+    return [
+        _Piece(p.vertices[rows], faces, _in_sheet(uv / repeats, inner), p.paint)
+        for p, rows, faces, uv in turned
+    ]
+
+
+def _cells(count: int, top: int, bottom: int) -> list[Box]:
+    """Boxes of about equal size in rows of the sheet, between two heights."""
     if count == 0:
         return []
     ratio = (bottom - top) / PACKED_PIXELS
@@ -229,18 +243,22 @@ def _cells(count: int, top: int, bottom: int) -> list[tuple[int, int, int, int]]
     return every[:count]
 
 
-def _within_repeats(piece: _Piece) -> _Piece:
-    """The same piece, each face in the lowest repeats of its image; vertices whose faces lie in others are doubled."""
+def _within_repeats(
+    piece: _Piece,
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, "m 3"], Float[np.ndarray, "k 2"]]:
+    """The piece's vertices, faces and coordinates, each face in the lowest repeats of its image.
+
+    Vertices whose faces lie in different repeats are there for each.
+    """
     assert piece.uv is not None
-    corners = piece.uv[piece.faces]
-    shifts = np.floor(corners.min(axis=1) + 1e-6).astype(int)
+    shifts = np.floor(piece.uv[piece.faces].min(axis=1) + 1e-6).astype(int)
     each = np.concatenate([piece.faces.reshape(-1, 1), np.repeat(shifts, 3, axis=0)], axis=1)
     kept, index = np.unique(each, axis=0, return_inverse=True)
     uv = np.maximum(piece.uv[kept[:, 0]] - kept[:, 1:], 0.0)
-    return _Piece(piece.vertices[kept[:, 0]], index.reshape(-1, 3), uv, piece.paint)
+    return kept[:, 0], index.reshape(-1, 3), uv
 
 
-def _tiled(image: Image.Image, repeats: int, box: tuple[int, int, int, int]) -> Image.Image:
+def _tiled(image: Image.Image, repeats: int, box: Box) -> Image.Image:
     """The image side by side with itself, as large as the box."""
     size = box[2] - box[0], box[3] - box[1]
     one = image.resize(
@@ -249,15 +267,7 @@ def _tiled(image: Image.Image, repeats: int, box: tuple[int, int, int, int]) -> 
     return Image.fromarray(np.tile(np.asarray(one), (repeats, repeats, 1))).resize(size)
 
 
-def _paste(sheet: Image.Image, image: Image.Image, box: tuple[int, int, int, int]) -> None:
-    """With a margin that repeats the edges, which smaller pictures of the sheet mix into it."""
-    wide = np.pad(np.asarray(image), ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="edge")
-    sheet.paste(Image.fromarray(wide), (box[0] - MARGIN, box[1] - MARGIN))
-
-
-def _in_sheet(
-    uv: Float[np.ndarray, "n 2"], box: tuple[int, int, int, int]
-) -> Float[np.ndarray, "n 2"]:
+def _in_sheet(uv: Float[np.ndarray, "n 2"], box: Box) -> Float[np.ndarray, "n 2"]:
     """Coordinates in a box of the sheet as those of the sheet, from below."""
     left, top, right, bottom = box
     u = (left + uv[:, 0] * (right - left)) / PACKED_PIXELS

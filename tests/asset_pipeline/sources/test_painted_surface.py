@@ -90,6 +90,18 @@ def test_an_image_that_repeats_goes_on_repeating(tmp_path, materials):
             assert _near(_seen(found, (x + 0.25, y + 0.08)), YELLOW)
 
 
+def test_hundreds_of_images_have_their_places(tmp_path):
+    colours = [(i % 17 * 15, i // 17 * 14, 90) for i in range(300)]
+    library = []
+    for i, colour in enumerate(colours):
+        Image.new("RGB", (4, 4), colour).save(tmp_path / f"{i}.png")
+        library.append(f"newmtl M{i}\nmap_Kd {i}.png")
+    names = [f"M{i}" for i in range(len(colours))]
+    found = read_mesh_file(_squares(tmp_path, "\n".join(library), *names))
+    for i in range(0, len(colours), 13):
+        assert _seen(found, (2 * i + 0.5, 0.4)) == colours[i]
+
+
 def test_many_repeats_beside_a_colour_are_told(tmp_path, caplog):
     _quarters().save(tmp_path / "print.png")
     library = "newmtl A\nmap_Kd print.png\nnewmtl B\nKd 0 0 0\n"
