@@ -15,6 +15,8 @@ from manipose_mj.console.process import (
 )
 from manipose_mj.errors import InputError
 
+RESULTS = "robustness.json"
+
 
 def robustness(
     task: Annotated[Positional[str], arg(metavar="TASK")],
@@ -75,6 +77,9 @@ def robustness(
         raise InputError(
             f"plans is {plans}; expected at least 1, and at most one a world: {worlds}"
         )
+    out = out or Path("robustness") / task.rpartition("/")[2]
+    if (out / RESULTS).exists():
+        raise InputError(f"{out / RESULTS}: is there already; choose another --out")
     variation = Variation(friction, mass, gains, latency_ms, shift_cm, turn_deg)
     chosen = available_engine(engine)
     with output.Progress("plans") as progress:
@@ -99,9 +104,8 @@ def robustness(
             processes=jobs,
             on_progress=played,
         )
-    out = out or Path("robustness") / task.rpartition("/")[2]
     said = document(task, variation, ended, engine=chosen, seed=seed)
-    with new_cache_file(out / "robustness.json") as scratch:
+    with new_cache_file(out / RESULTS) as scratch:
         scratch.write_text(json.dumps(said, indent=1))
     with new_cache_file(out / "robustness.png") as scratch:
         draw(said, scratch)

@@ -106,6 +106,12 @@ def train_ppo(
             soft_wrap=True,
         )
 
+    if drawn.layout.goal_frames:
+        console.print(
+            f"{task}: the policy does not see where the object shall go; it can learn what all goals share",
+            soft_wrap=True,
+        )
+
     def show(row: dict[str, float]) -> None:
         console.print(
             f"{row['seconds']:5.0f} s, {row['actions'] / 1e6:6.2f} M actions: {row['succeeded']:4.0%} of "

@@ -87,7 +87,8 @@ def test_a_policy_about_something_else_is_no_beginning(tmp_path, capsys):
     ]
     out = ["--out", str(tmp_path / "ppo")]
     assert main(["train", "ppo", *words, *out, "--policy", shipped]) == EXIT_INPUT
-    said = capsys.readouterr().err.splitlines()[-1]
+    *_, note, said = capsys.readouterr().err.splitlines()
+    assert "the policy does not see where the object shall go" in note
     assert "about a task that opens or shuts one drawer or door" in said and "one object" in said
 
 

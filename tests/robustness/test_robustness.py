@@ -129,3 +129,7 @@ def test_the_command_writes_a_document_and_a_picture(tmp_path, capsys):
     robustness(TASK, plans=1, worlds=2, engine="c", out=out, objects=("box_000",), jobs=1)
     assert "as planned: 1 of 1" in capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"robustness.json", "robustness.png"}
+    with pytest.raises(
+        InputError, match=r"robustness.json: is there already; choose another --out"
+    ):
+        robustness(TASK, plans=1, worlds=2, engine="c", out=out, objects=("box_000",), jobs=1)
