@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
@@ -289,7 +290,7 @@ def _check(demos: DemoSet, where: Path) -> None:
         )
     if not isinstance(kwargs.get("split"), str):
         raise InputError(f"{where}: env_kwargs: split is {kwargs.get('split')!r}; expected a name")
-    if twice := [each for each in ids if ids.count(each) > 1]:
+    if twice := [each for each, count in Counter(ids).items() if count > 1]:
         raise InputError(f"{where}: describes episode {twice[0]} twice")
 
 

@@ -35,7 +35,9 @@ _NAMES = {
 }  # of a parameter, if several
 _NOT_TAKEN = (400, 422)  # status of what an endpoint does not take
 # A question that is too long is as long without a parameter, though the refusal may list them.
-_TOO_LONG = r"context[ _](length|window|size)|too long|too many tokens|maximum .{0,20}tokens"
+_TOO_LONG = (
+    r"context[ _](length|window|size)|(prompt|input|messages) (is|are) too long|too many tokens"
+)
 
 
 class EndpointModel:
