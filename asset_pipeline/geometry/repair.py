@@ -88,10 +88,7 @@ def _pieces_inside_out(surface: trimesh.Trimesh) -> list[Int[np.ndarray, "faces"
     lows = np.array([corners[piece].min(axis=(0, 1)) for piece in pieces])
     highs = np.array([corners[piece].max(axis=(0, 1)) for piece in pieces])
     volumes = np.array([_volume(corners[piece]) for piece in pieces])
-    _, edge, counts = np.unique(
-        surface.edges_sorted, axis=0, return_inverse=True, return_counts=True
-    )
-    shared = (counts[edge.reshape(-1)] == 2).reshape(-1, 3).mean(axis=1)
+    shared = (_faces_at_edges(surface) == 2).mean(axis=1)
     is_closed = np.array([shared[piece].mean() >= NEARLY_CLOSED for piece in pieces])
 
     def around(inner: int) -> list[int]:
@@ -143,10 +140,7 @@ def drop_flaps(mesh: trimesh.Trimesh) -> int:
     surface = _stitched(mesh)
     points = np.asarray(surface.vertices)[surface.edges_sorted]
     lengths = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
-    _, index, counts = np.unique(
-        surface.edges_sorted, axis=0, return_inverse=True, return_counts=True
-    )
-    alone = (counts[index.reshape(-1)] == 1).reshape(-1, 3)
+    alone = _faces_at_edges(surface) == 1
     long = lengths.reshape(-1, 3).max(axis=1) > FLAP * np.median(lengths)
     flaps = (alone.sum(axis=1) >= 2) & long
     if flaps.any() and not flaps.all():
@@ -196,6 +190,12 @@ def _stitched(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 def _edge_counts(mesh: trimesh.Trimesh) -> Int[np.ndarray, "edges"]:
     """Of every edge, the number of its faces."""
     return np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
+
+
+def _faces_at_edges(mesh: trimesh.Trimesh) -> Int[np.ndarray, "faces 3"]:
+    """Of each face's three edges, the number of faces that have them."""
+    _, index, counts = np.unique(mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+    return counts[index.reshape(-1)].reshape(-1, 3)
 
 
 def weld(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

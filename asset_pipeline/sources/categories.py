@@ -189,6 +189,7 @@ PRODUCT_WORDS: tuple[tuple[str, str], ...] = (
     ("shoes", "shoe"),
     ("ball", ""),
 )
+_PRODUCTS = dict(PRODUCT_WORDS)
 # In a product's name these also measure: "25 oz 4 cups".
 _ALSO_UNITS = {"cup"}
 
@@ -246,10 +247,9 @@ def _from_the_last(words: list[str]) -> Iterator[str]:
 
 def _known(phrase: str) -> Kind | None:
     """The rigid category that a phrase names, in the singular or the plural."""
-    products = dict(PRODUCT_WORDS)
     for spelt in (phrase, phrase.removesuffix("s"), phrase.removesuffix("es")):
-        kind = kind_of(products.get(spelt) or spelt)
-        is_known = spelt in products or kind.category in CATALOGUE or kind.category in OTHER_TYPES
+        kind = kind_of(_PRODUCTS.get(spelt) or spelt)
+        is_known = spelt in _PRODUCTS or kind.category in CATALOGUE or kind.category in OTHER_TYPES
         if is_known and kind.object_type != "articulated":
             return kind
     return None

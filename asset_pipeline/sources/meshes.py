@@ -240,9 +240,10 @@ def _unit(found: MeshFile, category: str, file: Path) -> tuple[str, str]:
 def _meshes_in(folder: Path) -> list[Path]:
     """Those in a folder and in its folders, and a warning of what is left out."""
     found, broken, deep = [], [], []
+    whole = folder.resolve()
     for pattern in ("*", "*/*"):
         for file in sorted(folder.glob(pattern)):
-            if folder.resolve().is_relative_to(file.parent.resolve()) and file.parent != folder:
+            if file.parent != folder and whole.is_relative_to(file.parent.resolve()):
                 continue  # a link back
             if _is_shown_mesh(file.relative_to(folder)):
                 if file.is_file():

@@ -12,7 +12,8 @@ def as_rgb(image: Image.Image) -> Image.Image:
     """With 8 bits a channel; 16 bits are scaled, which Pillow would clip."""
     if image.mode.startswith("I"):
         levels = np.asarray(image).astype(float)
-        most = 65535.0 if levels.max(initial=0) > 255 else 255.0
+        # Of 32 bits, as older Pillows read 16, nobody says how many are used.
+        most = 65535.0 if ";16" in image.mode or levels.max(initial=0) > 255 else 255.0
         image = Image.fromarray(np.uint8(np.clip(levels / most, 0, 1) * 255 + 0.5))
     return image.convert("RGB")
 

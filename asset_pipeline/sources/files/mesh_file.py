@@ -120,7 +120,8 @@ def _check_gltf(path: Path) -> None:
         data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
     try:
         document = json.loads(data)
-        required = document.get("extensionsRequired", [])
+        required = document.get("extensionsRequired") or []
+        compressed = [what for extension, what in COMPRESSIONS.items() if extension in required]
         placed = [
             material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
             for material in document.get("materials", [])
@@ -132,11 +133,10 @@ def _check_gltf(path: Path) -> None:
         ]
     except (ValueError, AttributeError, TypeError, RecursionError):
         return  # trimesh will say so
-    for extension, what in COMPRESSIONS.items():
-        if extension in required:
-            raise InputError(
-                f"{path}: is compressed by {what}, which is not read; export it without compression"
-            )
+    if compressed:
+        raise InputError(
+            f"{path}: is compressed by {compressed[0]}, which is not read; export it without compression"
+        )
     if moved:
         log.warning(
             "%s: images lie on it by %s or a second set of coordinates, which are not read: they will be out of "

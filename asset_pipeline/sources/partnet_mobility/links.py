@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -206,6 +207,7 @@ def _shut(
     kind: Literal["slide", "hinge"] = "slide" if joint.kind == "prismatic" else "hinge"
     origin, axis = frame[:3, 3], frame[:3, :3] @ joint.axis
 
+    @cache
     def box(value: float) -> float:
         """The volume of the box around the base and the link there."""
         both = np.stack([_bounds(base), _bounds(_turned(link, kind, origin, axis, value))])

@@ -186,6 +186,8 @@ def test_coordinates_that_are_not_read_are_told(tmp_path, caplog):
 def test_sixteen_bits_become_eight():
     image = Image.fromarray(np.array([[0, 32768, 65535]], np.uint16))
     assert np.asarray(as_rgb(image))[0, :, 0].tolist() == [0, 128, 255]
+    dark = Image.fromarray(np.array([[0, 200]], np.uint16))
+    assert np.asarray(as_rgb(dark))[0, :, 0].tolist() == [0, 1]
     few = Image.fromarray(np.array([[0, 255]], np.int32))
     assert np.asarray(as_rgb(few))[0, :, 0].tolist() == [0, 255]
 
