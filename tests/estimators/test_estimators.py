@@ -226,7 +226,9 @@ def test_pose_evaluate_runs_it(monkeypatch, capsys):
     monkeypatch.setattr("manipose_mj.cli.pose.foreign_views.split_indices", lambda *_: [4])
     words = ["pose", "evaluate", "mug", "--estimator", f"{HERE}:Middle", "--views", "2"]
     assert main([*words, "--give-cad", "--json"]) == 0
-    (row,) = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    (row,) = json.loads(printed.out)
+    assert printed.err.count("the middle of") == 2
     assert row["n"] == 2 and row["method"] == f"{HERE}:Middle" and row["given_cad"]
     assert row["origin_cm_mean"] < 10 and row["trained_on"] is None
     assert main([*words, "--give-cad"]) == 0
