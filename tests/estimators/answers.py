@@ -16,9 +16,7 @@ class Middle:
 
     def estimate(self, observation):
         self.seen.append(observation)
-        print(
-            "the middle of", len(observation["cloud"]), "points"
-        )  # no business of tables and JSON
+        sys.stdout.write("the middle of the points\n")  # no business of tables and JSON
         pose = np.eye(4)
         pose[:3, 3] = np.median(observation["cloud"], axis=0)
         return {"pose": pose, "score": self.score}
