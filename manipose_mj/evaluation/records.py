@@ -1,7 +1,7 @@
 """What an evaluation leaves on disk: one JSON line per episode, and one trajectory file.
 
 Both are written so that a process killed at any instant leaves only whole records behind, but for
-one line at the end of `results.jsonl`, which the reader drops.
+one line at the end of `results.jsonl` that lacks its newline, which the reader drops.
 """
 
 from __future__ import annotations
@@ -159,32 +159,28 @@ def _is_of(value: Any, kind: str) -> bool:
 def read_results(path: Path) -> tuple[list[EpisodeResult], int]:
     """The whole records of a `results.jsonl`, and the length [bytes] of the part that holds them.
 
-    A last line that a killed process left unfinished is not part of either.
+    A last line without its newline, which a killed process left unfinished, is not part of either.
 
     Raises:
-      InputError: A line other than the last is not a record, or an episode occurs twice.
+      InputError: A line with its newline is not a record, or an episode occurs twice.
     """
     if not path.exists():
         return [], 0
     results: list[EpisodeResult] = []
     seen: set[tuple[str, int]] = set()
     size = 0
-    lines = path.read_bytes().splitlines(keepends=True)
-    for number, raw in enumerate(lines, start=1):
+    whole = path.read_bytes().split(b"\n")[:-1]
+    for number, raw in enumerate(whole, start=1):
         try:
-            if not raw.endswith(b"\n"):
-                raise ValueError("the line has no end")
             result = from_line(raw.decode("utf-8"))
         except ValueError as error:
-            if number == len(lines):
-                break
             raise InputError(f"{path}: line {number} is not an episode's result: {error}") from None
         if result.key in seen:
             task, episode = result.key
             raise InputError(f"{path}: line {number} repeats episode {episode} of {task}")
         seen.add(result.key)
         results.append(result)
-        size += len(raw)
+        size += len(raw) + 1
     return results, size
 
 
