@@ -156,6 +156,11 @@ def _is_of(value: Any, kind: str) -> bool:
     return kind in kinds and isinstance(value, kinds[kind])
 
 
+def storable(text: str) -> str:
+    """What a stranger says, as UTF-8 can hold it: half a pair of characters, as of bytes that are no text, is escaped."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def read_results(path: Path) -> tuple[list[EpisodeResult], int]:
     """The whole records of a `results.jsonl`, and the length [bytes] of the part that holds them.
 

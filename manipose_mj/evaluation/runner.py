@@ -25,6 +25,7 @@ from manipose_mj.evaluation.policy_settings import PolicySettings, attachment_of
 from manipose_mj.evaluation.records import (
     EpisodeResult,
     Trajectory,
+    storable,
     to_line,
     trajectory_path,
     write_atomically,
@@ -282,6 +283,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
             result, trajectory = runner(
                 config.env_config(task), spec, episode=episode, pose=config.pose
             )
+        result = replace(result, reason=storable(result.reason))
         to_line(result)  # a number that is not finite shows here, where it costs one episode only
     except (ServerLostError, ServerAbsentError) as error:
         # A worker that finds no server comes late: the evaluation spoke with it before the first episode.
@@ -291,12 +293,17 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
         raise
     except Exception as error:  # one broken episode must not end the other hundred
         logger.debug("episode %d of %s raised", episode, task, exc_info=True)
-        write_atomically(path.with_suffix(".error.txt"), traceback.format_exc().encode("utf-8"))
+        _write_traceback(path, traceback.format_exc())
         return _crashed(config, task, episode, error, time.perf_counter() - start)
     write_trajectory(path, trajectory)
     if trajectory.raised:
-        write_atomically(path.with_suffix(".error.txt"), trajectory.raised.encode("utf-8"))
+        _write_traceback(path, trajectory.raised)
     return result
+
+
+def _write_traceback(trajectory: Path, text: str) -> None:
+    """Leave a traceback beside an episode's trajectory."""
+    write_atomically(trajectory.with_suffix(".error.txt"), storable(text).encode("utf-8"))
 
 
 def _crashed(
@@ -314,7 +321,7 @@ def _crashed(
         success_once=False,
         success_at_end=False,
         failure="policy" if of_policy else "physics",
-        reason=reason[:300],
+        reason=storable(reason[:300]),
         translation_error=None,
         rotation_error=None,
         steps=0,

@@ -16,6 +16,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation.cards.markdown import OWN_CODE, card_markdown
 from manipose_mj.evaluation.cards.method import method_of
 from manipose_mj.evaluation.cards.run_record import RunRecord, read_run
+from manipose_mj.evaluation.cards.text import is_line
 from manipose_mj.evaluation.records import write_atomically
 from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
 from manipose_mj.evaluation.statistics import summarize
@@ -44,7 +45,7 @@ class About:
 
     def __post_init__(self) -> None:
         for field, value in asdict(self).items():
-            if not isinstance(value, str) or not value.strip() or len(value.splitlines()) > 1:
+            if not is_line(value):
                 raise InputError(f"{field} is {value!r}; expected one line of text")
         if not re.fullmatch(r"https://\S+", self.code_url) and self.code_url != OWN_CODE:
             raise InputError(

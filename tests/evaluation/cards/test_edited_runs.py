@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.cards.card import About
 from manipose_mj.evaluation.cards.run_record import read_run
 from tests.evaluation.cards.test_cards import evaluated
 
@@ -76,9 +75,3 @@ def test_a_value_of_another_type_is_named_with_its_line(run, field, value, said)
     with pytest.raises(InputError) as refusal:
         read_run(run)
     assert str(refusal.value) == f"{path}: line {number + 1} is not an episode's result: {said}"
-
-
-@pytest.mark.parametrize("url", ["https://", "https://a.org/my code", "https://a.org/\tb"])
-def test_an_address_of_code_has_no_blanks(url):
-    with pytest.raises(InputError, match="without blanks"):
-        About("ours", url, "none")
