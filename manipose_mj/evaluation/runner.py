@@ -18,6 +18,7 @@ from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, worker_deaths
 from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
+from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.planner_settings import PlannerSettings
@@ -145,12 +146,15 @@ def evaluate(
 
     Raises:
       InputError: The folder cannot be written or holds results of something else, an episode's
-        input is wrong, the protocol's assets are not all there, or there is no such cluster.
+        input is wrong, the protocol's assets are not all there, a task is not as the protocol fixes it, or there is
+        no such cluster.
       WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
     config.check_assets()
     config, metadata = _checked_policy(config)
     said = {"policy metadata": metadata, "estimator metadata": _estimator_metadata(config)}
+    if runner is None:
+        _check_protocol(config)
     if runner is None and config.policy is not None:
         runner = PolicyRunner(config.policy)
     elif runner is None:
@@ -214,6 +218,16 @@ def _checked_policy(config: EvaluationConfig) -> tuple[EvaluationConfig, dict[st
     attachment = attachment_of(policy) if config.batch is None else None
     told = replace(config, policy=replace(config.policy, attachment=attachment))
     return told, metadata_of(policy)
+
+
+def _check_protocol(config: EvaluationConfig) -> None:
+    """Refuse tasks that are not what the protocol fixes any more."""
+    if config.protocol is None:
+        return
+    from manipose_mj.evaluation.protocol.present_settings import check_settings  # as above
+
+    for task in config.tasks:
+        check_settings(protocol.load(config.protocol), config.env_config(task))
 
 
 def _estimator_metadata(config: EvaluationConfig) -> dict[str, Any]:

@@ -57,10 +57,19 @@ def builtin_tasks() -> list[TaskSpec]:
     return [spec for spec in specs if spec.factory.__module__.startswith("manipose_mj.tasks.")]
 
 
-def frozen_settings(spec: TaskSpec, config: EnvConfig | None = None) -> dict[str, Any]:
-    """What the protocol's file says of a task's configuration, from the task itself."""
+def frozen_settings(
+    spec: TaskSpec, config: EnvConfig | None = None, asked: EpisodeSpec | None = None
+) -> dict[str, Any]:
+    """What the protocol's file says of a task's configuration, from the task itself.
+
+    Args:
+      spec: The task.
+      config: The environment; by default that of evaluations with built-in assets.
+      asked: Of an episode whose objects are at hand, as the task is made with some; they change no setting.
+    """
     scenes = SceneSource(spec, config or evaluation_config(spec))
-    task = scenes.build(scenes.draw(np.random.RandomState(0), EpisodeSpec()))
+    asked = asked or EpisodeSpec(seed=0)
+    task = scenes.build(scenes.draw(np.random.RandomState(asked.seed), asked))
     return {
         "horizon": task.config.horizon,
         "tolerance": asdict(task.config.tolerance),
