@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation.command_words import number_word
 
 if TYPE_CHECKING:
     from manipose_mj.control.perception.perturbed import PosePerturbation
@@ -66,8 +67,7 @@ class InjectedErrors:
             elif isinstance(value, list):
                 words += [_option(name), *value]
             else:
-                short = f"{value:g}"
-                words += [_option(name), short if float(short) == value else repr(value)]
+                words += [_option(name), number_word(value)]
         return words
 
     @property

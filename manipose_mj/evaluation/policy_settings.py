@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from manipose_mj.control.perception.source_names import MASK_SOURCES, POSE_SOURCES
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.evaluation.command_words import number_word
 from manipose_mj.tasks.observations.ground_truth import told_by_all
 
 Stop = Literal["success", "horizon"]
@@ -112,7 +113,7 @@ class PolicySettings:
         if self.arguments is not None:
             words += ["--policy-args", self.arguments]
         words += ["--obs-mode", self.obs_mode, "--control-mode", self.control_mode]
-        words += ["--hz", f"{self.hz:g}"]
+        words += ["--hz", number_word(self.hz)]
         if self.execute is not None:
             words += ["--execute", str(self.execute)]
         return [*words, "--obs-format", self.obs_format, "--stop", self.stop]

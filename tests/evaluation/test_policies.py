@@ -313,6 +313,12 @@ def test_the_command_repeats_the_evaluation(tmp_path):
     ) in config.command
 
 
+@pytest.mark.parametrize("hz", [50.0, 12.5, 20 / 3, 0.1 + 0.2])
+def test_the_command_states_the_rate_exactly(hz):
+    words = PolicySettings("a.b:C", hz=hz).words
+    assert float(words[words.index("--hz") + 1]) == hz
+
+
 def test_resampling_keeps_what_an_episode_is_about(tmp_path):
     asked = EvaluationConfig((TASK,), tmp_path, 20, protocol="v1")
     other = replace(asked, resample=1)
