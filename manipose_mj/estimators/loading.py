@@ -7,6 +7,7 @@ from functools import lru_cache
 from manipose_mj.estimators.service import EstimatorService, RemoteEstimator
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.user_code import made_by_user
+from manipose_mj.wire.address import shown
 from manipose_mj.wire.client import is_address
 
 
@@ -19,6 +20,6 @@ def load_estimator(settings: EstimatorSettings) -> EstimatorService:
         answers at the address.
     """
     if is_address(settings.name):
-        return EstimatorService(settings.name, RemoteEstimator(settings.name))
+        return EstimatorService(shown(settings.name), RemoteEstimator(settings.name))
     estimator = made_by_user(settings.name, "--estimator", settings.keywords, ("estimate",))
     return EstimatorService(settings.name, estimator)

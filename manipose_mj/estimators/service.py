@@ -13,6 +13,7 @@ from manipose_mj.estimators.answer import EstimatorFailedError, checked_answer
 from manipose_mj.estimators.observation import Observation
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.user_code import reason_of
+from manipose_mj.wire.address import shown
 from manipose_mj.wire.client import Client, RemoteFailureError
 
 
@@ -62,14 +63,14 @@ class RemoteEstimator:
             return self._client.ask(observation)
         except RemoteFailureError as error:
             self.close()
-            raise EstimatorFailedError(f"{self.address}: {error}") from None
+            raise EstimatorFailedError(f"{shown(self.address)}: {error}") from None
 
 
 class EstimatorService:
     """Somebody's estimator, whose mistakes are told from ours.
 
     Attributes:
-      name: As it was asked for.
+      name: For messages.
       estimator: It.
     """
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.user_code import factory_arguments
+from manipose_mj.wire.address import shown
 from manipose_mj.wire.client import is_address
 
 
@@ -32,7 +33,7 @@ class EstimatorSettings:
             return
         if is_address(self.name):
             raise InputError(
-                f"--estimator {self.name}: a server takes no --estimator-args; give them to it"
+                f"--estimator {shown(self.name)}: a server takes no --estimator-args; give them to it"
             )
         _ = self.keywords  # if they are none
 
@@ -43,18 +44,18 @@ class EstimatorSettings:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What two runs must share for their results to belong together; reports show it."""
-        return {"name": self.name, "arguments": self.keywords, "given CAD": self.give_cad}
+        """What two runs must share for their results to belong together, without secrets; reports show it."""
+        return {"name": shown(self.name), "arguments": self.keywords, "given CAD": self.give_cad}
 
     @property
     def source(self) -> str:
         """Where poses come from, for people."""
-        return f"estimated by {self.name}" + (", given CAD" if self.give_cad else "")
+        return f"estimated by {shown(self.name)}" + (", given CAD" if self.give_cad else "")
 
     @property
     def words(self) -> list[str]:
-        """Its options on the command line."""
-        words = ["--estimator", self.name]
+        """Its options on the command line, but for a user, password or query in an address."""
+        words = ["--estimator", shown(self.name)]
         if self.arguments is not None:
             words += ["--estimator-args", self.arguments]
         return [*words, "--give-cad"] if self.give_cad else words

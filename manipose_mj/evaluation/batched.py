@@ -24,6 +24,7 @@ from manipose_mj.evaluation.rollout import ROUNDING, SUCCESS_HELD
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.policies.protocol import NOT_FINITE, ActionSpace
 from manipose_mj.poses import Array
+from manipose_mj.wire.address import shown
 
 _LOOK_EVERY = 5  # actions between looks at whether all episodes have ended
 
@@ -92,7 +93,7 @@ def _policy(settings: PolicySettings) -> BatchPolicy:
     policy = load_policy(settings.name, settings.arguments)
     if not isinstance(policy, BatchPolicy):
         raise InputError(
-            f"--policy {settings.name}: has no method act, which batched worlds ask for all actions at once; leave "
+            f"--policy {shown(settings.name)}: has no method act, which batched worlds ask for all actions at once; leave "
             "out --engine"
         )
     return policy

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from manipose_mj.control.language.address import URL_VARIABLE, check_address, without_secrets
+from manipose_mj.control.language.address import URL_VARIABLE, check_address
 from manipose_mj.errors import InputError
+from manipose_mj.wire.address import without_secrets
 
 if TYPE_CHECKING:
     from manipose_mj.control.language.exchanges import ChatModel

@@ -10,6 +10,7 @@ from manipose_mj.control.perception.source_names import MASK_SOURCES, POSE_SOURC
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.evaluation.command_words import number_word
 from manipose_mj.tasks.observations.ground_truth import told_by_all
+from manipose_mj.wire.address import shown
 
 Stop = Literal["success", "horizon"]
 STOPS: tuple[Stop, ...] = ("success", "horizon")
@@ -100,16 +101,16 @@ class PolicySettings:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What two runs must share for their results to belong together; JSON."""
-        given = dict(vars(self))
+        """What two runs must share for their results to belong together; JSON, without the secrets of an address."""
+        given = {**vars(self), "name": shown(self.name)}
         attachment = given.pop("attachment")
         # Runs of policies that are not given the simulator say nothing of it, nor did they ever.
         return given if attachment is None else {**given, "attachment": dict(vars(attachment))}
 
     @property
     def words(self) -> list[str]:
-        """The options of the command line that say the same."""
-        words = ["--policy", self.name]
+        """The options of the command line that say the same, but for a user, password or query in an address."""
+        words = ["--policy", shown(self.name)]
         if self.arguments is not None:
             words += ["--policy-args", self.arguments]
         words += ["--obs-mode", self.obs_mode, "--control-mode", self.control_mode]

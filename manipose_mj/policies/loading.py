@@ -10,6 +10,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.policies.client import RemotePolicy
 from manipose_mj.policies.protocol import Policy
 from manipose_mj.user_code import factory_arguments, made_by_user
+from manipose_mj.wire.address import shown
 from manipose_mj.wire.client import is_address
 
 
@@ -28,7 +29,9 @@ def load_policy(name: str, arguments: str | None = None) -> Policy:
     keywords = factory_arguments(arguments, "--policy-args")
     if is_address(name):
         if keywords:
-            raise InputError(f"--policy {name}: a server takes no --policy-args; give them to it")
+            raise InputError(
+                f"--policy {shown(name)}: a server takes no --policy-args; give them to it"
+            )
         remote = RemotePolicy(name)
         remote.open()
         return remote

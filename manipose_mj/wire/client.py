@@ -10,6 +10,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError
+from manipose_mj.wire.address import shown
 from manipose_mj.wire.framing import pack, unpack
 
 SCHEMES = ("ws://", "wss://")
@@ -38,7 +39,7 @@ def is_address(reference: str) -> bool:
     """
     if "://" in reference and not reference.startswith(SCHEMES):
         raise InputError(
-            f"{reference}: servers of methods have addresses with {' or '.join(SCHEMES)}, such as ws://localhost:8000"
+            f"{shown(reference)}: servers of methods have addresses with {' or '.join(SCHEMES)}, such as ws://localhost:8000"
         )
     return reference.startswith(SCHEMES)
 
@@ -131,9 +132,11 @@ class Client:
     def _gone(self, reason: str) -> Exception:
         """The error of a server that is not there, or not any more."""
         self.close()
+        where = shown(self.address)
+        reason = reason.replace(self.address, where)
         if self._reached:
-            return ServerLostError(f"{self.address}: the {self.kind} answers no more ({reason})")
-        return ServerAbsentError(f"{self.address}: no {self.kind} answers there ({reason})")
+            return ServerLostError(f"{where}: the {self.kind} answers no more ({reason})")
+        return ServerAbsentError(f"{where}: no {self.kind} answers there ({reason})")
 
 
 def _reason(error: Exception) -> str:

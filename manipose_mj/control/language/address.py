@@ -5,6 +5,7 @@ from __future__ import annotations
 from urllib.parse import parse_qsl, urlsplit
 
 from manipose_mj.errors import InputError
+from manipose_mj.wire.address import without_secrets
 
 URL_VARIABLE = "OPENAI_BASE_URL"
 _EXAMPLE = "http://localhost:8000/v1"
@@ -35,16 +36,6 @@ def no_address(address: str, option: str = "--base-url") -> InputError:
     return InputError(
         f"{option} {without_secrets(address)[:200]!r}: expected an address such as {_EXAMPLE}"
     )
-
-
-def without_secrets(address: str) -> str:
-    """An address without the user, password and query that may be in it."""
-    start, marked, rest = address.partition("://")
-    if not marked:
-        start, rest = "", address
-    host, slash, path = rest.partition("/")
-    known = host.rpartition("@")[2]
-    return f"{start}{marked}{known}{slash}{path}".partition("?")[0].partition("#")[0]
 
 
 def without_query(address: str) -> tuple[str, dict[str, str]]:

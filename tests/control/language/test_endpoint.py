@@ -9,7 +9,6 @@ from http.server import BaseHTTPRequestHandler
 
 import pytest
 
-from manipose_mj.control.language.address import without_secrets
 from manipose_mj.control.language.description import scene_text
 from manipose_mj.control.language.destinations import named_destinations
 from manipose_mj.control.language.endpoint import KEY_VARIABLE, URL_VARIABLE, EndpointModel
@@ -272,11 +271,6 @@ def test_a_keys_spaces_do_not_count(serve, tmp_path, monkeypatch):
     monkeypatch.setenv(KEY_VARIABLE, f" {KEY}\n")
     ask, _ = asked(server, tmp_path)
     assert len(ask()) == 3
-
-
-def test_an_address_is_on_record_without_secrets():
-    assert without_secrets("http://me:pw@host:1/v1?api-key=s") == "http://host:1/v1"
-    assert without_secrets("https://api.openai.com/v1") == "https://api.openai.com/v1"
 
 
 def test_a_server_that_drips_is_not_waited_for(serve, tmp_path):
