@@ -43,8 +43,8 @@ def _method(text: str) -> str:
 
 
 def _text(said: str) -> str:
-    """What somebody said, as Markdown that is neither HTML nor a link; as cards have it."""
-    return re.sub(r"[\[\]<>]", lambda found: f"\\{found[0]}", said)
+    """What somebody said, as Markdown that is neither HTML nor a link, code or attributes; as cards have it."""
+    return re.sub(r"[\\`\[\]<>{}]", lambda found: f"\\{found[0]}", said)
 
 
 def _cell(text: str) -> str:

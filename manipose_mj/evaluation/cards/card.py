@@ -22,6 +22,8 @@ from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
 from manipose_mj.evaluation.statistics import summarize
 
 CARD_FILE, TEXT_FILE, SCHEMA_VERSION = "card.json", "card.md", 1
+# Neither HTML nor Markdown can end within one; all else is written as %20 and the like.
+_ADDRESS = re.compile(r"https://[A-Za-z0-9._~:/?#@!$&*+,;=%-]+")
 # Of a task's statistics, what a card states.
 STATED = ("success_at_end", "success_once", "wilson_95", "wilson_95_once", "failures")
 
@@ -47,9 +49,9 @@ class About:
         for field, value in asdict(self).items():
             if not is_line(value):
                 raise InputError(f"{field} is {value!r}; expected one line of text")
-        if not re.fullmatch(r"https://\S+", self.code_url) and self.code_url != OWN_CODE:
+        if not _ADDRESS.fullmatch(self.code_url) and self.code_url != OWN_CODE:
             raise InputError(
-                f"code_url is {self.code_url!r}; expected https://... without blanks, or {OWN_CODE!r}"
+                f"code_url is {self.code_url!r}; expected https://... without blanks, brackets and quotes, or {OWN_CODE!r}"
             )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.cards.method import method_text
+from manipose_mj.evaluation.cards.text import as_text
 
 OWN_CODE = "this repository"
 
@@ -27,11 +27,6 @@ def card_markdown(card: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_text(said: str) -> str:
-    """What somebody said, as Markdown that is neither HTML nor a link."""
-    return re.sub(r"[\[\]<>]", lambda found: f"\\{found[0]}", said)
-
-
 def _coverage(run: Mapping[str, Any]) -> str:
     """How many of the protocol's tasks a run is of, such as `1 of 34`."""
     return f"{len(run['tasks'])} of {len(protocol.load(run['protocol']).tasks)}"
@@ -39,7 +34,7 @@ def _coverage(run: Mapping[str, Any]) -> str:
 
 def _run_lines(run: Mapping[str, Any]) -> list[str]:
     seeds = "frozen seeds" if run["resample"] is None else f"seeds resampled from {run['resample']}"
-    versions = ", ".join(f"{name} {value}" for name, value in run["versions"].items())
+    versions = ", ".join(as_text(f"{name} {value}") for name, value in run["versions"].items())
     rows = [
         f"| `{task}` | {row['n']} | {row['success_at_end']} | {_interval(row['wilson_95'])} | "
         f"{row['success_once']} | {_interval(row['wilson_95_once'])} | {_failures(row['failures'])} |"
@@ -56,9 +51,9 @@ def _run_lines(run: Mapping[str, Any]) -> list[str]:
         *rows,
         "",
         f"Protocol sha256 `{run['protocol_sha256'][:16]}`, results sha256 `{run['results_sha256'][:16]}`. "
-        f"{versions}; {run['machine']}.",
+        f"{versions}; {as_text(run['machine'])}.",
         "",
-        f"    {run['command']}",
+        *(f"    {line}" for line in run["command"].split("\n")),
     ]
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from manipose_mj.control.perception.source_names import masks_of
+from manipose_mj.evaluation.cards.text import as_code
 from manipose_mj.evaluation.policy_settings import settings_of
 from manipose_mj.tasks.observations.ground_truth import told_by_all
 
@@ -57,9 +57,9 @@ def method_text(method: Mapping[str, Any]) -> str:
     text = _policy(method) if method.get("policy") else _baseline(method)
     text += f", grasps by {method['grasps']}" if method.get("grasps") else ""
     if method.get("engine"):
-        text += f"; batched worlds of engine `{method['engine']}`"
+        text += f"; batched worlds of engine {as_code(method['engine'])}"
     if method.get("assets sha256"):
-        text += f"; builds of own assets `{method['assets sha256'][:16]}`"
+        text += f"; builds of own assets {as_code(method['assets sha256'][:16])}"
     return text + (f"; errors made on purpose: {', '.join(made)}" if made else "")
 
 
@@ -72,9 +72,10 @@ def _policy(method: Mapping[str, Any]) -> str:
         *(["true instance masks"] if told.masks else []),
     ]
     among = f", {' and '.join(truths)} among them" if truths else ""
-    given = _line(policy.get("arguments"))
-    text = f"policy `{policy['name']}`" + (f" with arguments `{given}`" if given else "")
-    text += f", observations `{seen}`{among}"
+    given = policy.get("arguments")
+    text = f"policy {as_code(policy['name'])}"
+    text += f" with arguments {as_code(given)}" if given else ""
+    text += f", observations {as_code(seen)}{among}"
     attachment = policy.get("attachment")
     if not attachment:
         return text
@@ -85,7 +86,7 @@ def _policy(method: Mapping[str, Any]) -> str:
     return (
         text + taken
         if poses
-        else f"{text}{masks or 'no masks'} and poses `{attachment['pose_source']}`"
+        else f"{text}{masks or 'no masks'} and poses {as_code(attachment['pose_source'])}"
     )
 
 
@@ -100,11 +101,11 @@ def _baseline(method: Mapping[str, Any]) -> str:
 
 
 def _planner(planner: Mapping[str, Any]) -> str:
-    told = f", told `{_line(planner['instruction'])}`," if planner.get("instruction") else ""
+    told = f", told {as_code(planner['instruction'])}," if planner.get("instruction") else ""
     if planner["kind"] == "llm":
-        return f"the baseline with plans of the language model `{planner['model']}`{told}"
+        return f"the baseline with plans of the language model {as_code(planner['model'])}{told}"
     if planner["kind"] == "replay":
-        answers = f"`{planner['replay sha256'][:16]}`"
+        answers = as_code(planner["replay sha256"][:16])
         return f"the baseline with recorded plans {answers} of a language model{told}"
     return "the baseline planner"
 
@@ -112,14 +113,7 @@ def _planner(planner: Mapping[str, Any]) -> str:
 def _estimator(estimator: Mapping[str, Any] | None) -> str:
     if not estimator:
         return "by the package's weights from true instance masks"
-    given = (
-        f" with arguments `{_line(estimator['arguments'])}`" if estimator.get("arguments") else ""
-    )
+    arguments = estimator.get("arguments")
+    given = f" with arguments {as_code(arguments)}" if arguments else ""
     meshes = " and the objects' meshes" if estimator.get("given CAD") else ""
-    return f"by `{estimator['name']}`{given} from true instance masks{meshes}"
-
-
-def _line(value: Any) -> str:
-    """A value in a line, as code of Markdown can hold it."""
-    text = value if isinstance(value, str) else json.dumps(value) if value else ""
-    return " ".join(text.split()).replace("`", "'")
+    return f"by {as_code(estimator['name'])}{given} from true instance masks{meshes}"

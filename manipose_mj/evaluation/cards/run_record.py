@@ -4,60 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
-from manipose_mj.evaluation.cards.method import NEEDED, sources_of
+from manipose_mj.evaluation.cards.method import sources_of
+from manipose_mj.evaluation.cards.run_forms import check_forms
 from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.records import EpisodeResult, read_results
 from manipose_mj.evaluation.results_folder import RESULTS_FILE, RUN_FILE
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _holds(value: Any, *names: str) -> bool:
-    """Whether it is an object with texts of these names."""
-    return isinstance(value, dict) and all(isinstance(value.get(name), str) for name in names)
-
-
-def _is_planner(value: Any) -> bool:
-    more = {"rules": (), "llm": ("model",), "replay": ("replay sha256",)}
-    return _holds(value, "kind") and value["kind"] in more and _holds(value, *more[value["kind"]])
-
-
-# Of what a card tells, and seeds depend on: what it has to be, in words and as a test.
-_FORMS: dict[str, tuple[str, Callable[[Any], bool]]] = {
-    "tasks": (
-        "a list of names",
-        lambda value: isinstance(value, list) and all(isinstance(each, str) for each in value),
-    ),
-    "episodes": ("a whole number", _whole),
-    "resample": ("null or a whole number", lambda value: value is None or _whole(value)),
-    "pose": ("a name", lambda value: isinstance(value, str)),
-    "policy": (
-        "null or an object with name and obs_mode",
-        lambda value: value is None or _holds(value, "name", "obs_mode"),
-    ),
-    "planner": ("an object with the kind rules, llm or replay, and what that needs", _is_planner),
-    "estimator": (
-        "null or an object with a name",
-        lambda value: value is None or _holds(value, "name"),
-    ),
-    "batch": (
-        "null or an object with an engine",
-        lambda value: value is None or _holds(value, "engine"),
-    ),
-    "assets sha256": ("null or a text", lambda value: isinstance(value, str | None)),
-    "injected errors": ("null or an object", lambda value: isinstance(value, dict | None)),
-    "estimator metadata": ("null or an object", lambda value: isinstance(value, dict | None)),
-    "grasps": ("null or a name", lambda value: isinstance(value, str | None)),
-}
 
 
 @dataclass(frozen=True)
@@ -117,14 +75,7 @@ def _run_file(path: Path) -> dict[str, Any]:
             f"{path}: protocol {frozen.version} has sha256 {frozen.sha256[:12]}..., "
             f"the run is of {str(run.get('protocol sha256'))[:12]}..."
         )
-    missing = [name for name in NEEDED if name not in run]
-    if missing:
-        raise InputError(
-            f"{path}: lacks {missing[0]!r}, so that it does not tell its method; evaluate again"
-        )
-    for name, (expected, fits) in _FORMS.items():
-        if name in run and not fits(run[name]):
-            raise InputError(f"{path}: {name} is {run[name]!r:.80}; expected {expected}")
+    check_forms(path, run)
     return run
 
 

@@ -20,7 +20,9 @@ def test_what_is_not_one_line_of_text_is_refused(option, said, tmp_path, capsys)
     assert line == f"manipose: {field} is {said!r}; expected one line of text"
 
 
-@pytest.mark.parametrize("url", ["https://", "https://a.org/my code"])
+@pytest.mark.parametrize(
+    "url", ["https://", "https://a.org/my code", "https://a><b>", "https://a)[b](c"]
+)
 def test_an_address_of_code_has_no_blanks(url):
     with pytest.raises(InputError, match="without blanks"):
         About("ours", url, "none")

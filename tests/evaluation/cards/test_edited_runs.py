@@ -41,7 +41,16 @@ def run(whole, tmp_path) -> Path:
         ("batch", {"worlds": 2}, "expected null or an object with an engine"),
         ("assets sha256", 1, "expected null or a text"),
         ("injected errors", [1], "expected null or an object"),
-        ("grasps", {}, "expected null or a name"),
+        ("injected errors", {"<b>": 1.0}, "expected null or an object of errors that can be made"),
+        ("injected errors", {"pose_error_cm": "<b>"}, "expected null or an object of errors"),
+        ("injected errors", {"cameras": ["<b>"]}, "expected null or an object of errors"),
+        ("grasps", {}, "expected null or one of annotated, shape, cloud"),
+        ("grasps", "<b>", "expected null or one of annotated, shape, cloud"),
+        ("machine", "a\nb", "expected one line of text"),
+        ("machine", None, "expected one line of text"),
+        ("command", "a\x1bb", "expected a command line"),
+        ("numpy version", "1\n2", "a version is 'numpy version 1\\n2'; expected one line of text"),
+        ("x\ny version", "1", "a version is 'x\\ny version 1'; expected one line of text"),
     ],
 )
 def test_a_field_of_another_form_is_named(run, field, value, said):
@@ -51,7 +60,17 @@ def test_a_field_of_another_form_is_named(run, field, value, said):
         read_run(run)
     message = str(refusal.value)
     assert message.startswith(f"{path}: ") and said in message and "\n" not in message
-    assert field.split()[0].removesuffix("s") in message
+    assert repr(field)[1:-1].split()[0].removesuffix("s") in message
+
+
+@pytest.mark.parametrize("field", ["command", "machine", "mujoco version"])
+def test_a_run_that_cannot_be_repeated_is_refused(run, field):
+    path = run / "run.json"
+    document = json.loads(path.read_text())
+    del document[field]
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=f"lacks '{field}', so that it cannot be repeated"):
+        read_run(run)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from manipose_mj.evaluation.cards.card import check_card
-from manipose_mj.evaluation.cards.markdown import as_text
 from manipose_mj.evaluation.cards.method import method_text
+from manipose_mj.evaluation.cards.text import as_text
 from tests.places import ROOT
 
 CARDS = sorted(path.parent for path in (ROOT / "leaderboard").glob("*/card.json"))
@@ -61,11 +61,11 @@ def test_bars_in_what_makers_say_end_no_cell(hook):
 
 
 def test_what_makers_say_is_neither_html_nor_a_link(hook):
-    said = "<b>x</b> [here](https://b.org)"
+    said = "<b>x</b> [here](https://b.org) `c` {onclick=d} \\<e>"
     card = {"name": said, "code_url": "https://a.org/", "training_data": said}
     run = json.loads((CARDS[0] / "card.json").read_text(encoding="utf-8"))["runs"][0]
     row = hook._row(card, run, "method")
-    escaped = r"\<b\>x\</b\> \[here\](https://b.org)"
+    escaped = r"\<b\>x\</b\> \[here\](https://b.org) \`c\` \{onclick=d\} \\\<e\>"
     assert row.count(escaped) == 2 and row.count("<b>") == 0
     assert as_text(said) == escaped
 
