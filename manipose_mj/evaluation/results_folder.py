@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -71,18 +71,25 @@ def _lock(file: IO[bytes], out: Path) -> None:
 
 
 def kept_results(
-    out: Path, identity: dict[str, Any], file: IO[bytes], *, resume: bool
+    out: Path,
+    identity: dict[str, Any],
+    seeds: Mapping[tuple[str, int], int],
+    file: IO[bytes],
+    *,
+    resume: bool,
 ) -> list[EpisodeResult]:
     """The results to keep, with an unfinished last line cut off the file.
 
     Args:
       out: The folder.
       identity: Of this run; it may have more tasks and more episodes a task than the results were asked for.
+      seeds: Of every episode that this run asks for, by task and number.
       file: The open results file.
       resume: Whether results may be there.
 
     Raises:
-      InputError: There are results and `resume` is False, or they belong to another configuration.
+      InputError: There are results and `resume` is False, or they belong to another configuration, or one is of an
+        episode or a seed that this run does not ask for; the file stays as it is.
     """
     results, size = read_results(out / RESULTS_FILE)
     if results and not resume:
@@ -98,6 +105,14 @@ def kept_results(
                     f"{value!r}; resume with the same configuration, of which tasks and episodes "
                     "may be more, or choose another --out"
                 )
+    for number, result in enumerate(results, start=1):
+        if seeds.get(result.key) != result.seed:
+            known = seeds.get(result.key)
+            asked = "does not ask for it" if known is None else f"has seed {known} there"
+            raise InputError(
+                f"{out / RESULTS_FILE}: line {number} is episode {result.episode} of {result.task} with seed "
+                f"{result.seed}; this run {asked}: restore the file or choose another --out"
+            )
     file.truncate(size)
     return results
 

@@ -163,8 +163,13 @@ def evaluate(
         runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
     identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}, **said}
     del identity["platform version"]  # a new kernel changes no result
+    seeds = {
+        (task, episode): config.episode_seed(task, episode)
+        for task in sorted(config.tasks)
+        for episode in range(config.episodes)
+    }
     with cluster(config.dask), results_file(config.out) as file:
-        results = kept_results(config.out, identity, file, resume=resume)
+        results = kept_results(config.out, identity, seeds, file, resume=resume)
         if not results or not is_asked_for(config.out, identity):
             (config.out / SUMMARY_FILE).unlink(missing_ok=True)  # of fewer episodes
             run = {
@@ -176,13 +181,8 @@ def evaluate(
             }
             write_atomically(config.out / RUN_FILE, _json(run))
         done = {r.key for r in results}
-        missing = [
-            (task, episode)
-            for task in sorted(config.tasks)
-            for episode in range(config.episodes)
-            if (task, episode) not in done
-        ]
-        total = len(config.tasks) * config.episodes
+        missing = [key for key in seeds if key not in done]
+        total = len(seeds)
         on_progress(results, total)
         for result in _outcomes(config, runner, missing):
             append_result(file, result)

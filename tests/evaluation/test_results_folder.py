@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -27,3 +28,23 @@ def test_a_line_of_somebody_elses_file_is_refused_and_stays(tmp_path, content, r
     with pytest.raises(InputError, match="line 1 is not an episode's result") as refusal:
         evaluate(config(tmp_path), resume=resume, runner=fake.make_runner())
     assert path.read_bytes() == content and "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"seed": 7}, "with seed 7; this run has seed "),
+        ({"episode": 9}, "; this run does not ask for it"),
+        ({"task": "single_object/position"}, "; this run does not ask for it"),
+    ],
+)
+def test_a_kept_line_that_the_run_does_not_ask_for_is_refused_and_stays(tmp_path, changes, said):
+    evaluate(config(tmp_path), runner=fake.make_runner())
+    path = tmp_path / RESULTS_FILE
+    first, *others = path.read_text().splitlines(keepends=True)
+    edited = "".join([*others, json.dumps(json.loads(first) | changes) + "\n"]) + first[:30]
+    path.write_text(edited)
+    with pytest.raises(InputError, match="line 4 is episode ") as refusal:
+        evaluate(config(tmp_path), resume=True, runner=fake.make_runner())
+    assert said in str(refusal.value) and "\n" not in str(refusal.value)
+    assert path.read_text() == edited
