@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -48,13 +49,17 @@ def _claim(out: Path) -> None:
     """Drop an earlier demo's results and mark the folder as a demo's.
 
     Results that are not a demo's stay, and the evaluation then refuses the folder.
-    """
-    from manipose_mj.evaluation.results_folder import RESULTS_FILE
 
-    results = out / RESULTS_FILE
+    Raises:
+      InputError: Another demo or evaluation is writing there, or nobody can.
+    """
+    from manipose_mj.evaluation.results_folder import results_file
+
     mark = out / MARK
-    if mark.exists():
-        results.unlink(missing_ok=True)
-    elif not results.exists():
-        out.mkdir(parents=True, exist_ok=True)
-        mark.write_text("`manipose demo` replaces the results in this folder.\n", encoding="utf-8")
+    with results_file(out) as file:
+        if mark.exists():
+            file.truncate(0)
+        elif not os.fstat(file.fileno()).st_size:
+            mark.write_text(
+                "`manipose demo` replaces the results in this folder.\n", encoding="utf-8"
+            )
