@@ -11,6 +11,7 @@ from typing import Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
+from manipose_mj.evaluation.cards.episode_rules import broken_rules
 from manipose_mj.evaluation.cards.method import sources_of
 from manipose_mj.evaluation.cards.run_forms import check_forms
 from manipose_mj.evaluation.config import EvaluationConfig
@@ -38,8 +39,8 @@ def read_run(folder: Path) -> RunRecord:
 
     Raises:
       InputError: A file is missing or broken, the run follows no protocol of this version or does not tell its
-        method, or an episode is missing, superfluous, of another seed, about another object or told other things
-        than the run; one line says which.
+        method, or an episode is missing, superfluous, of another seed, against the protocol's rules or told other
+        things than the run; one line says which.
     """
     run = _run_file(folder / RUN_FILE)
     path = folder / RESULTS_FILE
@@ -76,6 +77,11 @@ def _run_file(path: Path) -> dict[str, Any]:
             f"the run is of {str(run.get('protocol sha256'))[:12]}..."
         )
     check_forms(path, run)
+    for name in ("seed", "objects"):
+        if run.get(name):
+            raise InputError(
+                f"{path}: {name} is {run[name]!r:.80}; protocol {frozen.version} fixes seeds and objects"
+            )
     return run
 
 
@@ -115,7 +121,7 @@ def _config(folder: Path, run: dict[str, Any]) -> EvaluationConfig:
 
 
 def _check_episodes(path: Path, config: EvaluationConfig, results: Sequence[EpisodeResult]) -> None:
-    """Every episode of the run is there, on its own seed and objects, and no other."""
+    """Every episode of the run is there, on its own seed and by the protocol's rules, and no other."""
     found = {result.key: result for result in results}
     assert config.protocol is not None
     frozen = protocol.load(config.protocol)
@@ -130,11 +136,7 @@ def _check_episodes(path: Path, config: EvaluationConfig, results: Sequence[Epis
                     f"protocol {config.protocol} has {seed}"
                 )
             fixed = frozen.episode(task, episode)
-            # What a seed draws is drawn again where it finds no start; what was asked for never is.
-            if fixed.object is not None and result.object not in ("", fixed.object):
-                raise InputError(
-                    f"{path}: episode {episode} of {task} is about {result.object}; protocol "
-                    f"{config.protocol} has {fixed.object}"
-                )
+            for broken in broken_rules(frozen.task(task), fixed, result):
+                raise InputError(f"{path}: episode {episode} of {task}: {broken}")
     for task, episode in found:
         raise InputError(f"{path}: episode {episode} of {task} is not of this run")

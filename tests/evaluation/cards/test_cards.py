@@ -111,7 +111,8 @@ def test_an_edited_line_is_refused(card, capsys):
     path = card / "runs" / "0" / "results.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     failed = next(i for i, line in enumerate(lines) if not line["success_at_end"])
-    edit_line(path, failed, success_at_end=True, success_once=True, failure=None)
+    done = {"success_at_end": True, "success_once": True, "failure": None, "reason": ""}
+    edit_line(path, failed, **done, translation_error=0.0, rotation_error=0.0)
     assert "the results are not those the card was made of" in refusal(card, capsys)
 
 
@@ -130,7 +131,7 @@ def test_a_missing_seed_is_refused_and_named(card, capsys):
     ("line", "changes", "message"),
     [
         (2, {"seed": 7}, "has seed 7; protocol v1 has"),
-        (8, {"object": "mug_000"}, "is about mug_000; protocol v1 has"),
+        (8, {"object": "mug_000"}, "is about mug_000; the protocol has"),
         (2, {"episode": 9}, "is missing"),
         (2, {"steps": "many", "extra": 1}, "line 3 is not an episode's result"),
     ],

@@ -18,6 +18,16 @@ def whole(tmp_path_factory) -> Path:
     return evaluated(tmp_path_factory.mktemp("runs") / "run")
 
 
+def edited_success(run: Path, **changes) -> tuple[Path, int]:
+    """The results of a run whose first success was changed, and its number among the lines, from 0."""
+    path = run / "results.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    number = next(i for i, line in enumerate(lines) if line["success_at_end"])
+    lines[number] |= changes
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path, number
+
+
 @pytest.fixture
 def run(whole, tmp_path) -> Path:
     return Path(shutil.copytree(whole, tmp_path / "run"))
@@ -31,6 +41,8 @@ def run(whole, tmp_path) -> Path:
         ("tasks", ["single_object/none"], "unknown task of protocol v1"),
         ("episodes", 6.0, "expected a whole number"),
         ("episodes", 101, "protocol v1 has 100 episodes"),
+        ("seed", 3, "protocol v1 fixes seeds and objects"),
+        ("objects", ["mug_000"], "protocol v1 fixes seeds and objects"),
         ("resample", 1.5, "expected null or a whole number"),
         ("resample", -1, "expected a whole number, at least 0"),
         ("pose", [], "expected a name"),
@@ -86,11 +98,7 @@ def test_a_run_that_cannot_be_repeated_is_refused(run, field):
     ],
 )
 def test_a_value_of_another_type_is_named_with_its_line(run, field, value, said):
-    path = run / "results.jsonl"
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    number = next(i for i, line in enumerate(lines) if line["success_at_end"])
-    lines[number][field] = value
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    path, number = edited_success(run, **{field: value})
     with pytest.raises(InputError) as refusal:
         read_run(run)
     assert str(refusal.value) == f"{path}: line {number + 1} is not an episode's result: {said}"
