@@ -68,8 +68,8 @@ def make_card(folders: Sequence[Path], about: About, out: Path | None = None) ->
       The card's folder.
 
     Raises:
-      InputError: An evaluation is not complete or not on a protocol, two are the same or of different methods, or the
-        folder exists or cannot be written.
+      InputError: An evaluation is not complete or not on a protocol, two have the same episodes or are of different
+        methods, none is on the frozen seeds, or the folder exists or cannot be written.
     """
     if not folders:
         raise InputError("no folder of results given")
@@ -155,10 +155,26 @@ def _card(about: About, where: Sequence[str], records: Sequence[RunRecord]) -> d
             raise InputError(
                 f"the runs are of different methods ({', '.join(others)} differ); a card is of one"
             )
-    hashes = [record.sha256 for record in records]
-    if len(set(hashes)) < len(hashes):
-        raise InputError("two of the runs are the same")
+    _check_seeds(records)
     return {"schema_version": SCHEMA_VERSION, **asdict(about), "method": methods[0], "runs": runs}
+
+
+def _check_seeds(records: Sequence[RunRecord]) -> None:
+    """Every episode counts once, and the frozen seeds of each protocol are among them."""
+    seen: set[tuple[Any, ...]] = set()
+    for record in records:
+        seeds = record.run["protocol"], record.run.get("resample")
+        episodes = {(*seeds, *result.key) for result in record.results}
+        for *_, task, episode in sorted(episodes & seen, key=lambda each: each[2:]):
+            raise InputError(f"two of the runs are the same: both play episode {episode} of {task}")
+        seen |= episodes
+    frozen = {version for version, resample, *_ in seen if resample is None}
+    for version, resample, *_ in sorted(seen, key=str):
+        if version not in frozen:
+            raise InputError(
+                f"the runs on protocol {version} have seeds resampled from {resample} only; a card needs one on the "
+                "frozen seeds: evaluate without --resample too"
+            )
 
 
 def _entry(place: str, record: RunRecord) -> dict[str, Any]:
