@@ -44,11 +44,11 @@ def verify_protocol(
 
     Where one does not hold, as may be on another kind of processor, the start is tried by other samples of the planner,
     twice as many as by certify. Such starts are named as they are found, on standard error, and at the end. Exits with
-    1 if none solves one.
+    1 if none solves one, or if a certificate has lapsed: the protocol then has another start in its place.
 
     Args:
       version: Of the protocol.
-      tasks: Only these; by default all.
+      tasks: Only these, or those that fit patterns such as "clutter/*"; by default all.
       episodes: Only the first so many of each task; by default all.
       jobs: Episodes at the same time, one core each.
       certificates: File of certificates; by default the package's own.
@@ -69,32 +69,38 @@ def verify_protocol(
     starts = chosen_starts(protocol, tasks, episodes)
     find_assets(version, {task for task, _ in starts}, assets)
     certified = [start for start in starts if start in known.solved]
-    lapsed: dict[Key, str] = {}
+    lapsed = [start for start in starts if start in known.lapsed]
+    failed: dict[Key, str] = {}
     unsolved = 0
     with output.Progress("certificates") as progress:
         for done, (start, outcome) in enumerate(verify(version, known, certified, jobs, assets), 1):
             if isinstance(outcome, str):
-                lapsed[start] = outcome
+                failed[start] = outcome
                 unsolved += 1
             elif outcome != known.solved[start]:
-                lapsed[start] = (
+                failed[start] = (
                     f"its certificate does not hold here; solved by planner seed {outcome.planner_seed} "
                     f"and {outcome.plans} plans"
                 )
-            if start in lapsed:
-                progress.say(f"{start[0]} {start[1]}: {lapsed[start]}")
-            progress.update(done, len(certified), f"{done - len(lapsed)} hold")
+            if start in failed:
+                progress.say(f"{start[0]} {start[1]}: {failed[start]}")
+            progress.update(done, len(certified), f"{done - len(failed)} hold")
     console = output.standard_output()
-    for (task, number), said in sorted(lapsed.items()):
+    tried = {*known.solved, *known.unsolved, *lapsed}
+    changed = dict.fromkeys(
+        lapsed, "its certificate has lapsed: its start is another than was certified"
+    )
+    for (task, number), said in sorted({**failed, **changed}.items()):
         console.print(f"{task} {number}: {said}", soft_wrap=True)
     console.print(
-        f"{len(certified) - len(lapsed)} of {len(certified)} certificates hold, {len(lapsed) - unsolved} starts "
+        f"{len(certified) - len(failed)} of {len(certified)} certificates hold, {len(failed) - unsolved} starts "
         f"are solved by other samples, {unsolved} by none; of {len(starts)} starts, "
-        f"{sum(start in known.unsolved for start in starts)} are known as unsolved and "
-        f"{sum(start not in known.solved and start not in known.unsolved for start in starts)} untried",
+        + (f"the certificates of {len(lapsed)} have lapsed, " if lapsed else "")
+        + f"{sum(start in known.unsolved for start in starts)} are known as unsolved and "
+        f"{sum(start not in tried for start in starts)} untried",
         soft_wrap=True,
     )
-    return _EXIT_FAILED if unsolved else 0
+    return _EXIT_FAILED if unsolved or lapsed else 0
 
 
 def certify_protocol(
@@ -115,7 +121,7 @@ def certify_protocol(
     Args:
       version: Of the protocol.
       out: File of certificates, new or to be completed.
-      tasks: Only these; by default all.
+      tasks: Only these, or those that fit patterns such as "clutter/*"; by default all.
       episodes: Only the first so many of each task; by default all.
       again: Try starts that were not solved once more.
       jobs: Episodes at the same time, one core each.
@@ -137,9 +143,10 @@ def certify_protocol(
         raise InputError(f"{out.parent}: no such folder")
     protocol = load(version)
     known = load_certificates(protocol, out)
-    find_assets(version, tasks or protocol.tasks, assets)
+    starts = chosen_starts(protocol, tasks, episodes)
+    find_assets(version, {task for task, _ in starts}, assets)
     settled = set(known.solved) if again else {*known.solved, *known.unsolved}
-    missing = [each for each in chosen_starts(protocol, tasks, episodes) if each not in settled]
+    missing = [each for each in starts if each not in settled]
     with output.Progress("starts") as progress:
         for done, (start, outcome) in enumerate(certify(version, missing, jobs, assets), 1):
             known = known.with_outcome(start, outcome)

@@ -43,12 +43,14 @@ class Certificates:
       solved: By task and episode.
       unsolved: Of starts that no attempt solved: stage and reason of the last.
       refused: Reasons of the starts that were drawn before in an episode's place, and that nobody solved.
+      lapsed: Starts of which the protocol says something else than when they were certified.
     """
 
     version: str
     solved: Mapping[Key, Certificate] = field(default_factory=dict)
     unsolved: Mapping[Key, str] = field(default_factory=dict)
     refused: Mapping[Key, tuple[str, ...]] = field(default_factory=dict)
+    lapsed: frozenset[Key] = frozenset()
 
     def with_outcome(self, key: Key, outcome: Certificate | str) -> Certificates:
         """These and what an attempt at one more start came to."""
@@ -58,7 +60,7 @@ class Certificates:
             unsolved[key] = outcome
         else:
             solved[key] = outcome
-        return replace(self, solved=solved, unsolved=unsolved)
+        return replace(self, solved=solved, unsolved=unsolved, lapsed=self.lapsed - {key})
 
 
 def certificates_path(version: str) -> Path:
@@ -69,7 +71,8 @@ def certificates_path(version: str) -> Path:
 def load_certificates(protocol: Protocol, path: Path | None = None) -> Certificates:
     """The certificates of a protocol's starts; none where there is no file.
 
-    Those of starts that the protocol has no more are left out: it may have been frozen anew since.
+    Of starts that the protocol has no more they are left out: it may have been frozen anew since. Those whose episodes
+    it still has are told as lapsed.
 
     Args:
       protocol: The protocol.
@@ -98,6 +101,7 @@ def load_certificates(protocol: Protocol, path: Path | None = None) -> Certifica
         {key: each for key, (start, each) in certificates.items() if starts.get(key) == start},
         {key: reason for key, (start, reason) in unsolved.items() if starts.get(key) == start},
         {key: reasons for key, reasons in refused.items() if key in starts},
+        frozenset(k for k, (start, _) in certificates.items() if starts.get(k, start) != start),
     )
 
 

@@ -14,6 +14,7 @@ from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
 from manipose_mj.evaluation.protocol.own_assets import pool_folders
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.registry import tasks_named
 from manipose_mj.tasks.core.start import NoStartError
 
 # Budgets of plans, each with a seed of its own: first what an evaluation has, at last three times as many.
@@ -33,13 +34,13 @@ def attempts(seed: int, rounds: int = 1) -> tuple[Certificate, ...]:
 def chosen_starts(
     protocol: Protocol, tasks: Sequence[str] = (), episodes: int | None = None
 ) -> list[Key]:
-    """The starts of some tasks, or of all; the first `episodes` of each, or all.
+    """The starts of some tasks, by names or patterns, or of all; the first `episodes` of each, or all.
 
     Raises:
       InputError: The protocol lacks a task, or has no such number of episodes.
     """
     keys = []
-    for task in tasks or sorted(protocol.tasks):
+    for task in tasks_named(tasks, protocol.tasks) if tasks else sorted(protocol.tasks):
         most = len(protocol.task(task).episodes)
         count = most if episodes is None else episodes
         if not 1 <= count <= most:

@@ -128,16 +128,17 @@ def all_tasks() -> tuple[tuple[str, str], ...]:
     return tuple(_TASKS)
 
 
-def tasks_named(patterns: Iterable[str]) -> tuple[str, ...]:
+def tasks_named(patterns: Iterable[str], names: Iterable[str] | None = None) -> tuple[str, ...]:
     """The full names of tasks, each once, in the order of the patterns.
 
     Args:
       patterns: Full names, or patterns of them with `*`, `?` and `[...]` as of `fnmatch`.
+      names: To choose from; by default those of all registered tasks.
 
     Raises:
       InputError: There is no task of a name, or a pattern fits none.
     """
-    known = ["/".join(task) for task in all_tasks()]
+    known = ["/".join(task) for task in all_tasks()] if names is None else list(names)
     found: dict[str, None] = {}
     for pattern in patterns:
         fitting = fnmatch.filter(known, pattern)

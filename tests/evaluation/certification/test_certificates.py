@@ -60,9 +60,12 @@ def test_a_certificate_goes_with_its_start_and_stays_while_others_change(tmp_pat
     names = list(task.episodes)
     episodes = {**task.episodes, names[1]: replace(task.episodes[names[1]], seed=1)}
     changed = replace(V1, tasks={**V1.tasks, TASK: replace(task, episodes=episodes)})
-    assert load_certificates(changed, tmp_path / "c.json").solved == {(TASK, 0): Certificate(1, 5)}
+    some = load_certificates(changed, tmp_path / "c.json")
+    assert some.solved == {(TASK, 0): Certificate(1, 5)} and some.lapsed == {(TASK, 1)}
+    assert not some.with_outcome((TASK, 1), Certificate(3, 5)).lapsed
     longer = replace(V1, tasks={**V1.tasks, TASK: replace(task, horizon=task.horizon + 1)})
-    assert load_certificates(longer, tmp_path / "c.json") == Certificates("v1")
+    lapsed = frozenset({(TASK, 0), (TASK, 1)})
+    assert load_certificates(longer, tmp_path / "c.json") == Certificates("v1", lapsed=lapsed)
 
 
 def test_starts_that_nobody_solved_are_drawn_again_in_their_place_and_counted():
@@ -103,6 +106,10 @@ def test_other_files_are_refused(tmp_path, content, message):
 def test_starts_are_chosen_by_task_and_number():
     assert len(chosen_starts(V1)) == 100 * len(V1.tasks)
     assert chosen_starts(V1, [TASK], 2) == [(TASK, 0), (TASK, 1)]
+    shelf = chosen_starts(V1, ["single_object/target_pose*", TASK], 1)
+    assert shelf == [(TASK, 0), (f"{TASK}_shelf", 0)]
+    with pytest.raises(InputError, match="no task fits"):
+        chosen_starts(V1, ["none/*"])
     for wrong in (0, 101):
         with pytest.raises(InputError, match=f"episodes is {wrong}; expected 1 to 100"):
             chosen_starts(V1, [TASK], wrong)
@@ -171,6 +178,24 @@ def test_a_certificate_that_no_longer_holds_is_exit_1_with_its_reason(
     assert (
         "1 of 3 certificates hold, 1 starts are solved by other samples, 1 by none; of 5 starts, "
         "1 are known as unsolved and 1 untried" in said
+    )
+
+
+def test_a_certificate_of_another_start_has_lapsed_and_is_exit_1(tmp_path, capsys, monkeypatch):
+    known = Certificates("v1").with_outcome((TASK, 0), Certificate(0, MAX_PLANS))
+    path = tmp_path / "c.json"
+    save_certificates(known.with_outcome((TASK, 1), Certificate(1, MAX_PLANS)), V1, path)
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["solved"][TASK]["001"]["start"] = "0" * 12
+    path.write_text(json.dumps(document), encoding="utf-8")
+    monkeypatch.setattr(search, "verify", lambda *_: iter([((TASK, 0), known.solved[TASK, 0])]))
+    words = ["--tasks", f"{TASK[:-1]}?", "--episodes", "3", "--certificates", str(path)]
+    assert main(["protocol", "verify", *words]) == 1
+    said = capsys.readouterr().out
+    assert f"{TASK} 1: its certificate has lapsed" in said
+    assert (
+        "1 of 1 certificates hold, 0 starts are solved by other samples, 0 by none; of 3 starts, the certificates of 1 "
+        "have lapsed, 0 are known as unsolved and 1 untried" in said
     )
 
 
