@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +54,7 @@ def read_run(folder: Path) -> RunRecord:
         raise InputError(f"{path}: line {len(results) + 1} is not an episode's whole result")
     _check_episodes(path, _config(folder, run), results)
     _check_told(folder, run, results)
+    _check_command(folder / RUN_FILE, run)
     ordered = tuple(sorted(results, key=lambda result: result.key))
     return RunRecord(run, ordered, hashlib.sha256(content).hexdigest())
 
@@ -101,6 +104,28 @@ def _check_told(folder: Path, run: dict[str, Any], results: Sequence[EpisodeResu
                     f"{folder / RESULTS_FILE}: episode {result.episode} of {result.task} has {name} "
                     f"{found!r}; {RUN_FILE} tells of {expected!r}: evaluate again"
                 )
+
+
+def _check_command(path: Path, run: dict[str, Any]) -> None:
+    """The command that repeats the run asks for its episodes."""
+    try:
+        words = shlex.split(run["command"])
+    except ValueError:
+        words = []
+    first = next((i for i, word in enumerate(words) if word.startswith("--")), len(words))
+    options = dict(pairwise(words))
+    resample = run.get("resample")
+    for name, said, ran in (
+        ("program", words[:2], ["manipose", "evaluate"]),
+        ("tasks", sorted(words[2:first]), sorted(run["tasks"])),
+        ("episodes", options.get("--episodes"), str(run["episodes"])),
+        ("protocol", options.get("--protocol"), run["protocol"]),
+        ("resample", options.get("--resample"), None if resample is None else str(resample)),
+    ):
+        if said != ran:
+            raise InputError(
+                f"{path}: command has {name} {said!r:.80}; the run has {ran!r:.80}: evaluate again"
+            )
 
 
 def _config(folder: Path, run: dict[str, Any]) -> EvaluationConfig:

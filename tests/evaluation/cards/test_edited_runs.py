@@ -61,6 +61,7 @@ def run(whole, tmp_path) -> Path:
         ("machine", "a\nb", "expected one line of text"),
         ("machine", None, "expected one line of text"),
         ("command", "a\x1bb", "expected a command line"),
+        ("command", "manipose 'evaluate", "has program []; the run has ['manipose', 'evaluate']"),
         ("numpy version", "1\n2", "a version is 'numpy version 1\\n2'; expected one line of text"),
         ("x\ny version", "1", "a version is 'x\\ny version 1'; expected one line of text"),
     ],
@@ -73,6 +74,30 @@ def test_a_field_of_another_form_is_named(run, field, value, said):
     message = str(refusal.value)
     assert message.startswith(f"{path}: ") and said in message and "\n" not in message
     assert repr(field)[1:-1].split()[0].removesuffix("s") in message
+
+
+@pytest.mark.parametrize(
+    ("stated", "other", "said"),
+    [
+        ("--episodes 6", "--episodes 5", "command has episodes '5'; the run has '6'"),
+        ("--protocol v1", "--seed 0", "command has protocol None; the run has 'v1'"),
+        (
+            "--protocol v1",
+            "--protocol v1 --resample 2",
+            "command has resample '2'; the run has None",
+        ),
+        ("single_object/target_pose", "clutter/pick", "command has tasks ['articulated/"),
+    ],
+)
+def test_a_command_of_another_run_is_refused(run, stated, other, said):
+    path = run / "run.json"
+    document = json.loads(path.read_text())
+    assert stated in document["command"]
+    document["command"] = document["command"].replace(stated, other)
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError) as refusal:
+        read_run(run)
+    assert said in str(refusal.value) and "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize("field", ["command", "machine", "mujoco version"])
