@@ -33,7 +33,7 @@ class FixedError:
                 raise InputError(f"error: {name} is {value}; expected 0 or more")
 
     def __bool__(self) -> bool:
-        return self.translation > 0 or self.rotation > 0
+        return bool(self.translation > 0 or self.rotation > 0)
 
     def drawn(self, seed: int, name: str, *, axial: bool = False) -> Float[np.ndarray, "4 4"]:
         """`T_true_wrong`: a wrong pose is the true one times this.

@@ -13,6 +13,7 @@ from manipose_mj.mjcf.cameras.depth_noise import KINECT, measure
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics, camera_pose
 from manipose_mj.poses import invert, pose_error, rotation_angle, transform
 from manipose_mj.tasks.observations.fixed_error import FixedError
+from manipose_mj.tasks.observations.sensor_config import SensorConfig
 from tests import few_objects
 from tests.tasks.observed_scenes import SMALL, TARGET_POSE, hold, load
 
@@ -34,6 +35,11 @@ def test_an_error_has_its_size_and_goes_the_same_way_whatever_that_is():
 def test_an_error_is_not_negative():
     with pytest.raises(InputError, match="rotation is -1"):
         FixedError(0.0, -1.0)
+
+
+def test_numbers_of_numpy_are_sizes():
+    assert SensorConfig(camera_error=FixedError(rotation=np.deg2rad(1.0))).camera_error
+    assert not FixedError(np.float32(0.0), np.float64(0.0))
 
 
 def test_observed_poses_are_off_by_the_same_in_every_step_and_starts_are_the_same():
