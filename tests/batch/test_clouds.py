@@ -14,12 +14,13 @@ from manipose_mj.batch.perception.clouds import (
     noisy_images,
     object_clouds,
 )
-from manipose_mj.mjcf.cameras.depth_noise import Draws, measure_with
+from manipose_mj.mjcf.cameras.depth_noise import KINECT, Draws, StructuredLight, measure_with
 from manipose_mj.mjcf.cameras.depth_normals import depth_normals
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 
 HEIGHT, WIDTH = 48, 64
 PINHOLE = Intrinsics(WIDTH, HEIGHT, 60.0, 60.0, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
+EXACT = StructuredLight(disparity_step=0.0, noise=0.0)
 NUMBERS = np.array([PINHOLE.fx, PINHOLE.fy, PINHOLE.cx, PINHOLE.cy], np.float32)
 
 
@@ -58,16 +59,16 @@ def test_incidence_is_that_of_the_surfaces():
     np.testing.assert_allclose(np.asarray(found)[depth > 0], cosine[depth > 0], atol=2e-3)
 
 
-def test_the_same_draws_give_the_same_noise_in_jax():
+@pytest.mark.parametrize("sensor", [KINECT, EXACT], ids=["noise", "none"])
+def test_the_same_draws_give_the_same_noise_in_jax(sensor):
     depth, _, cosine = scene()
     rng = np.random.default_rng(0)
     shape = depth.shape
     drawn = rng.standard_normal((2, *shape)), rng.standard_normal(shape), rng.random(shape)
-    expected = measure_with(depth, cosine, PINHOLE.fx, Draws(*drawn))
+    expected = measure_with(depth, cosine, PINHOLE.fx, Draws(*drawn), sensor)
     ours = Draws(*(jnp.asarray(each, jnp.float32) for each in drawn))
-    found = measure_with(
-        jnp.asarray(depth, jnp.float32), jnp.asarray(cosine, jnp.float32), PINHOLE.fx, ours
-    )
+    exact = jnp.asarray(depth, jnp.float32), jnp.asarray(cosine, jnp.float32)
+    found = measure_with(*exact, PINHOLE.fx, ours, sensor)
     same = np.isclose(found.depth, expected.depth, atol=1e-5)
     assert same.mean() > 0.995  # the rest falls on the other side of a step
     assert (np.asarray(found.rows) == expected.rows).mean() > 0.999

@@ -10,10 +10,13 @@ drawn for each pixel by itself; the real sensor's is smooth over a few pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.ray_camera import Intrinsics
 from manipose_mj.poses import Array, namespace
 
@@ -29,13 +32,16 @@ class StructuredLight:
     Attributes:
       focal: Focal length to which pixels of the sources refer; noise keeps its angle in images
         of other sizes [pixels].
-      disparity_step: Depth `z` is reported in steps of `disparity_step * z**2` [1/m].
+      disparity_step: Depth `z` is reported in steps of `disparity_step * z**2`; 0: without steps [1/m].
       baseline: From the camera to the projector, along the camera's x [m].
       grazing: Angle of incidence from where pixels begin to fail, and where all have [rad]. The
         sources measured to some 80 deg; the ramp between is our assumption.
       speckle: Share of pixels that fail anywhere; our assumption.
       near, far: Limits of what is measured [m]; near as of PrimeSense's short-range model.
-      noise: Factor of all standard deviations, for sensors better or worse than the sources'.
+      noise: Factor of all standard deviations, for sensors better or worse than the sources'; 0: none.
+
+    Raises:
+      InputError: A figure is none of a sensor; names the field.
     """
 
     focal: float = 585.0
@@ -46,6 +52,34 @@ class StructuredLight:
     near: float = 0.35
     far: float = 5.0
     noise: float = 1.0
+
+    def __post_init__(self) -> None:
+        def require(name: str, fits: bool, expected: str) -> None:
+            if not fits:
+                raise InputError(
+                    f"structured light: {name} is {getattr(self, name)!r}; expected {expected}"
+                )
+
+        for name in ("disparity_step", "baseline", "near", "noise"):
+            value = getattr(self, name)
+            require(name, _is_number(value) and 0 <= value < np.inf, "0 or more")
+        focal = _is_number(self.focal) and 0 < self.focal < np.inf
+        require("focal", focal, "more than 0 pixels")
+        speckle = _is_number(self.speckle) and 0 <= self.speckle <= 1
+        require("speckle", speckle, "a share, 0 to 1")
+        far = _is_number(self.far) and self.near < self.far
+        require("far", far, f"more than near, {self.near}")
+        require("grazing", _is_ramp(self.grazing), "two angles [rad], 0 or more, the second larger")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real)
+
+
+def _is_ramp(value: Any) -> bool:
+    if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(_is_number, value)):
+        return False
+    return 0 <= value[0] < value[1] < np.inf
 
 
 KINECT = StructuredLight()
@@ -84,8 +118,10 @@ def quantised(depth: Float[Array, "*s"], step: float) -> Float[Array, "*s"]:
 
     Args:
       depth: [m].
-      step: Of the inverse depth [1/m].
+      step: Of the inverse depth; 0: depth stays as it is [1/m].
     """
+    if step == 0:
+        return depth
     xp, seen = namespace(depth), depth > 0
     inverse = xp.rint(1.0 / xp.where(seen, depth, 1.0) / step) * step
     return xp.where(seen, 1.0 / xp.maximum(inverse, step), 0.0)
@@ -189,7 +225,7 @@ def measure_with(
     shadow = projector_shadow(depth, focal, sensor.baseline)
     incidence = xp.arccos(xp.clip(xp.where(depth > 0, cosine, 1.0), 0.0, 1.0))
     lit = xp.where(shadow, 0.0, depth)
-    source_focal = sensor.focal / sensor.noise
+    source_focal = sensor.focal / sensor.noise if sensor.noise else np.inf  # no edge moves
     rows, columns = _edges_moved(lit, incidence, focal, source_focal, draws.shift)
     depth, incidence = lit[rows, columns], incidence[rows, columns]
     step = sensor.disparity_step * depth**2

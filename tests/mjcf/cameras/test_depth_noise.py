@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.depth_noise import (
     KINECT,
+    StructuredLight,
     axial_deviation,
     lateral_deviation,
     projector_shadow,
@@ -97,3 +101,34 @@ def test_nothing_stays_nothing_and_the_same_seed_gives_the_same_image():
     )
     np.testing.assert_array_equal(first, second)
     assert not first[:90].any() and first[110:130, 110:150].any()
+
+
+@pytest.mark.parametrize("step", [0.0, KINECT.disparity_step])
+def test_without_noise_and_steps_depth_is_exact(step):
+    depth = np.full((240, 320), 0.8)
+    depth[:, 160:] = 1.1
+    sensor = StructuredLight(disparity_step=step, baseline=0.0, speckle=0.0, noise=0.0)
+    rng = np.random.default_rng(6)
+    measured = structured_light(depth, np.ones_like(depth), CAMERA, rng, sensor)
+    np.testing.assert_array_equal(measured, quantised(depth, step) if step else depth)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("noise", np.nan),
+        ("noise", -1.0),
+        ("noise", "much"),
+        ("disparity_step", -0.1),
+        ("baseline", np.inf),
+        ("focal", 0.0),
+        ("speckle", 1.5),
+        ("near", -0.1),
+        ("far", 0.2),
+        ("grazing", (1.5, 1.0)),
+        ("grazing", 1.0),
+    ],
+)
+def test_figures_that_are_none_of_a_sensor_are_named(field, value):
+    with pytest.raises(InputError, match=f"structured light: {field} is .*; expected"):
+        replace(KINECT, **{field: value})
