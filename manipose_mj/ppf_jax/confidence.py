@@ -181,8 +181,17 @@ def alike(
     poses: Float[np.ndarray, "h 4 4"], pose: Float[np.ndarray, "4 4"], symmetry: CommonSymmetry
 ) -> Bool[np.ndarray, "h"]:
     """Which poses are within 15 deg and 2 cm of a pose, or of one that the symmetry takes for the same."""
+    return near(poses, np.broadcast_to(pose, poses.shape), symmetry)
+
+
+def near(
+    poses: Float[np.ndarray, "*#b 4 4"],
+    others: Float[np.ndarray, "*#b 4 4"],
+    symmetry: CommonSymmetry,
+) -> Bool[np.ndarray, "*#b"]:
+    """`alike` of poses and others that broadcast."""
     group = SymmetryGroup(_equivalent(symmetry), axial=symmetry.axial)
-    shift, turn = pose_error(poses.astype(float), np.broadcast_to(pose, poses.shape), group)
+    shift, turn = pose_error(poses.astype(float), others.astype(float), group)
     return (shift < NEAR[0]) & (turn < NEAR[1])
 
 

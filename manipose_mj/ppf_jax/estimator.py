@@ -16,19 +16,19 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import OBJECT_TYPES
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.poses import SymmetryGroup, pose_error
 from manipose_mj.ppf_jax.compilation_cache import keep_compiled
 from manipose_mj.ppf_jax.confidence import (
-    NEAR,
     Calibration,
     Scores,
     calibration_in,
+    near,
     scores_of,
 )
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.outlier_removal import not_alone
+from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.model import (
     Estimates,
@@ -180,7 +180,7 @@ class PoseEstimator:
             scores = scores_of(poses, confidence, error, symmetry)
             confidence = self.calibration.of_all(confidence, scores)
         each = [PoseEstimate(*row) for row in zip(poses, extents, confidence.tolist(), strict=True)]
-        order = distinct_first(poses, symmetry.axial)
+        order = distinct_first(poses, symmetry)
         first = each[0]
         others = tuple(each[i] for i in order[1:])
         return PoseEstimate(first.pose, first.extents, first.confidence, others)
@@ -293,14 +293,17 @@ def _row(found: Estimates, index: int) -> Estimates:
     return jax.tree.map(lambda leaf: leaf[index], found)
 
 
-def distinct_first(poses: Float[np.ndarray, "h 4 4"], axial: bool) -> list[int]:
-    """Rows in their order, but after all others those that are near one before them."""
-    group = SymmetryGroup.about_x() if axial else SymmetryGroup.identity()
-    shift, turn = pose_error(poses[:, None].astype(float), poses[None].astype(float), group)
-    near = (shift < NEAR[0]) & (turn < NEAR[1])
+def distinct_first(poses: Float[np.ndarray, "h 4 4"], symmetry: CommonSymmetry) -> list[int]:
+    """Rows in their order, but after all others those that are alike to one before them.
+
+    Args:
+      poses: Of all [m].
+      symmetry: That the network knows.
+    """
+    said = near(poses[:, None], poses[None], symmetry)
     distinct: list[int] = []
     for row in range(len(poses)):
-        if not near[row, distinct].any():
+        if not said[row, distinct].any():
             distinct.append(row)
     return distinct + [row for row in range(len(poses)) if row not in distinct]
 

@@ -93,7 +93,7 @@ class MultiViewEstimator:
         if self.single.calibration is not None:
             confidence = self.single.calibration.of_all(confidence, found.scores)
         symmetry = self.single.trained.model.config.symmetry
-        order = distinct_first(found.poses, symmetry.axial)
+        order = distinct_first(found.poses, symmetry)
         first, *others = (
             PoseEstimate(found.poses[i], found.extents[i], float(confidence[i])) for i in order
         )

@@ -17,7 +17,7 @@ class PoseEstimate:
       extents: `(3,)` [m], lengths of the bounding box along the label's axes.
       confidence: Probability that the pose is within 15 deg and 2 cm.
       hypotheses: The other candidates, likeliest first; but those that are within 15 deg and 2 cm of a likelier
-        one come after all others. None has hypotheses of its own.
+        one, up to the network's symmetry, come after all others. None has hypotheses of its own.
     """
 
     pose: Float[np.ndarray, "4 4"]

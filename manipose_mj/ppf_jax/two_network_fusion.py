@@ -16,6 +16,7 @@ from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator, distinct_first
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud
+from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 
 AGREED = np.deg2rad(25.0)  # between the axes that the two networks name
 
@@ -72,7 +73,7 @@ def agreed(upright: PoseEstimate, sides: PoseEstimate) -> PoseEstimate:
         return up, bool(each.extents[1] >= each.extents[2]), each.confidence
 
     ranked = sorted((sides, *sides.hypotheses), key=rank, reverse=True)
-    order = distinct_first(np.stack([each.pose for each in ranked]), axial=False)
+    order = distinct_first(np.stack([each.pose for each in ranked]), CommonSymmetry())
     first, *others = (
         PoseEstimate(ranked[i].pose, ranked[i].extents, ranked[i].confidence) for i in order
     )

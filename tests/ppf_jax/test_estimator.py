@@ -14,6 +14,7 @@ from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.points.cloud_input import Cloud
+from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 from manipose_mj.ppf_jax.rigid.model import ModelConfig, PoseModel, estimate_sample
 from manipose_mj.ppf_jax.rigid.voting import VotingConfig
 from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
@@ -85,12 +86,23 @@ def test_other_hypotheses_come_before_what_is_nearly_said_already():
         )
 
     poses = np.stack([upside_down(d) for d in (0, 4, 181, 10, 90, 178)]).astype(np.float32)
-    assert module.distinct_first(poses, axial=True) == [0, 2, 4, 1, 3, 5]
+    assert module.distinct_first(poses, CommonSymmetry(axial=True)) == [0, 2, 4, 1, 3, 5]
     spun = compose(rotation_about(np.array([1.0, 0.0, 0.0]), 1.0), np.array([0, 0, 0.5]))
     moved = compose(np.eye(3), np.array([0, 0.03, 0.5]))
     poses = np.stack([upside_down(0), spun, moved]).astype(np.float32)
-    assert module.distinct_first(poses, axial=True) == [0, 2, 1]
-    assert module.distinct_first(poses, axial=False) == [0, 1, 2]
+    assert module.distinct_first(poses, CommonSymmetry(axial=True)) == [0, 2, 1]
+    assert module.distinct_first(poses, CommonSymmetry()) == [0, 1, 2]
+
+
+def test_half_turns_of_a_box_come_after_its_other_poses():
+    spun, flipped = (rotation_about(axis, np.pi) for axis in np.eye(3)[:2])
+    tilted = rotation_about(np.array([0.0, 0.0, 1.0]), 1.0)
+    turns = (np.eye(3), spun, flipped, tilted)
+    poses = np.stack([compose(turn, np.array([0, 0, 0.5])) for turn in turns])
+    box = CommonSymmetry(unsigned_x=True, unsigned_y=True)
+    assert module.distinct_first(poses, box) == [0, 3, 1, 2]
+    assert module.distinct_first(poses, CommonSymmetry(unsigned_y=True)) == [0, 2, 3, 1]
+    assert module.distinct_first(poses, CommonSymmetry()) == [0, 1, 2, 3]
 
 
 @pytest.mark.full
