@@ -117,7 +117,8 @@ def _write_images(scene: Path, image: int, seen: SeenObject) -> dict[str, Any]:
     name = f"{image:06d}"
     steps = np.round(own.depth.astype(float) * 1000 / DEPTH_SCALE)
     Image.fromarray(own.rgb).save(scene / "rgb" / f"{name}.png")
-    depth = np.minimum(steps, np.iinfo(np.uint16).max).astype(np.uint16)
+    # What is further away than 16 bits reach is not measured.
+    depth = np.where(steps <= np.iinfo(np.uint16).max, steps, 0).astype(np.uint16)
     Image.fromarray(depth).save(scene / "depth" / f"{name}.png")
     masks = {"mask": own.silhouette, "mask_visib": own.visible, "mask_detected": own.mask}
     for place, mask in masks.items():

@@ -21,6 +21,7 @@ from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax.data.view_settings import view_setting
+from manipose_mj.ppf_jax.data.view_stream import catalogue_views
 from tests.bop.truth import HEAD, write_truth
 
 VIEWS = 2
@@ -86,6 +87,20 @@ def test_layout_is_the_one_that_readers_expect(data):
     assert len(targets) == 6 and targets[0] == {
         "scene_id": 1, "im_id": 0, "obj_id": 1, "inst_count": 1,
     }  # fmt: skip
+
+
+def test_depth_beyond_sixteen_bits_is_not_measured(tmp_path, monkeypatch):
+    def far(*chosen):
+        for seen in catalogue_views(*chosen):
+            depth = seen.picture.depth.copy()
+            depth[0, :3] = 6.5535, 6.6, 20.0
+            yield replace(seen, picture=replace(seen.picture, depth=depth))
+
+    monkeypatch.setattr(exporting, "split_indices", lambda *_: [4])
+    monkeypatch.setattr(exporting, "catalogue_views", far)
+    exporting.export(("bowl",), tmp_path / "set", view_setting("clean"), views=1)
+    with Image.open(tmp_path / "set" / "test" / "000001" / "depth" / "000000.png") as image:
+        assert np.asarray(image)[0, :3].tolist() == [65535, 0, 0]
 
 
 def test_images_show_the_model_where_the_truth_says(data):
