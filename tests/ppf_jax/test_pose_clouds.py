@@ -3,46 +3,26 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from asset_pipeline.build.emit import write_asset
-from manipose_mj.assets import catalogue
-from manipose_mj.assets.asset import Asset, Provenance
 from manipose_mj.cli.pose.clouds import PoseClouds
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.data.view_cache import VIEWS_PER_FILE
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry, common_symmetry
+from tests.ppf_jax.catalogue_assets import write_asset
 
 AXIAL = CommonSymmetry(axial=True)
-
-
-def write(directory, name, category, symmetry=None):
-    specimen = catalogue.generate(category, 0)
-    label = specimen.label if symmetry is None else replace(specimen.label, symmetry=symmetry)
-    asset = Asset(
-        folder=directory / name,
-        name=name,
-        kind="rigid",
-        category=category,
-        label=label,
-        up=np.array([0.0, 0.0, 1.0]),
-        mass_properties=specimen.bodies[0].mass_properties,
-        stable_poses=(),
-        provenance=Provenance(source="test", item=category, licence="Apache-2.0", inputs={}),
-    )
-    write_asset(asset, specimen.bodies)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     directory = tmp_path_factory.mktemp("assets")
-    write(directory, "round", "cup")
-    write(directory, "bent", "cup", SymmetryGroup.identity())
-    write(directory, "sheet", "razor")
+    write_asset(directory, "round", "cup")
+    write_asset(directory, "bent", "cup", SymmetryGroup.identity())
+    write_asset(directory, "sheet", "razor")
     return directory
 
 

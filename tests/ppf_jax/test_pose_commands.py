@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from importlib import resources
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +13,11 @@ import pytest
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
-from manipose_mj.ppf_jax.estimator import PoseEstimate
+from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.training.curve_picture import draw_curve
+from tests.ppf_jax.catalogue_assets import write_asset
 
 CUP, BOWL = (
     str(resources.files("manipose_mj.ppf_jax") / "weights" / f"{name}.npz")
@@ -73,17 +76,62 @@ class Parrot:
         return [self.estimate(cloud, key=key) for cloud in clouds]
 
 
+def labelled(points: np.ndarray, name: str, category: str = "a") -> LabelledCloud:
+    pose, extents = np.eye(4, dtype=np.float32), np.ones(3, np.float32)
+    return LabelledCloud(points, points, pose, extents, SymmetryGroup.identity(), name, category)
+
+
 def test_every_cloud_gets_its_own_answer():
-    clouds = []
-    for i in range(10):
-        points = np.full((40 + i, 3), i, np.float32)
-        pose, extents = np.eye(4, dtype=np.float32), np.ones(3, np.float32)
-        group = SymmetryGroup.identity()
-        clouds.append(LabelledCloud(points, points, pose, extents, group, f"a/{i}", "a"))
+    clouds = [labelled(np.full((40 + i, 3), i, np.float32), f"a/{i}") for i in range(10)]
     found = predict(Parrot(), clouds, batch=4)  # type: ignore[arg-type]
     np.testing.assert_array_equal(found.poses[:, 0, 3], np.arange(10))
     np.testing.assert_array_equal(found.confidence, 40 + np.arange(10))
     assert found.ms_per_object > 0
+
+
+class Known(Parrot):
+    """The same, trained on cups alone."""
+
+    trained = SimpleNamespace(method="ours", cameras="one", categories=("cup",))
+
+    def estimate_many(self, clouds, *, key):
+        return [self.estimate(cloud, key=key) for cloud in clouds]
+
+
+@pytest.fixture
+def evaluated(monkeypatch, capsys):
+    """The row of `pose evaluate` with these words, by an estimator that was trained on cups."""
+    monkeypatch.setattr(PoseEstimator, "load", lambda *_, **__: Known())
+
+    def row(*words: str) -> dict[str, Any]:
+        command = ["pose", "evaluate", *words, "--views", "1", "--jobs", "1", "--json"]
+        assert main(command) == 0
+        (found,) = json.loads(capsys.readouterr().out)
+        return found
+
+    return row
+
+
+def test_surfaces_of_objects_that_a_setting_tapers_are_not_compared(evaluated, monkeypatch):
+    cloud = labelled(np.ones((40, 3), np.float32), "cup_000/0", "cup")
+    monkeypatch.setattr("manipose_mj.cli.pose.clouds.catalogue_clouds", lambda *_, **__: [cloud])
+    assert "mssd_cm_mean" in evaluated("cup")
+    assert "mssd_cm_mean" not in evaluated("cup", "--setting", "training")
+
+
+@pytest.mark.parametrize(
+    ("assets", "name", "known"),
+    [
+        (("cup",), "axial", True),
+        (("bowl",), "axial", False),
+        (("cup", "bowl"), "axial", None),
+        (("cup", "bowl"), "bowl", False),
+    ],
+)
+def test_assets_are_unseen_by_their_own_category(evaluated, tmp_path, assets, name, known):
+    for category in assets:
+        write_asset(tmp_path, category, category)
+    assert evaluated(name, "--assets", str(tmp_path))["trained_on"] is known
 
 
 def test_a_curve_is_drawn_with_and_without_held_out_errors(tmp_path):

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
 from manipose_mj.cli.pose.train import Name
 from manipose_mj.console.process import CORES, compile_at_once_on_gpus, prepare_workers
 from manipose_mj.errors import InputError
+
+if TYPE_CHECKING:
+    from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 
 KEPT = 0.8  # share of the views that the estimator is surest of
 
@@ -111,8 +115,8 @@ def evaluate_pose(
                 frames = source.sources(clouds)
         if assets is not None:
             textured = textured_groups(assets)
-        elif labels == "unified":
-            hulls = catalogue_hulls(clouds)
+        elif labels == "unified" and not view_setting(setting).taper:
+            hulls = catalogue_hulls(clouds)  # of objects as they are, not as tapers draw them
         if own is not None:
             found = predict(FusedViewEstimator(own) if several else own, clouds)
         errors = pose_errors(found.poses, clouds, sources=frames, hulls=hulls, textured=textured)
@@ -128,7 +132,7 @@ def evaluate_pose(
                 **figures,
                 "confident_deg_mean": sure["deg_mean"],
                 "ms_per_object": found.ms_per_object,
-                "trained_on": None if own is None else category in own.trained.categories,
+                "trained_on": None if own is None else _trained_on(own.trained.categories, clouds),
             }
         )
     if json:
@@ -166,3 +170,9 @@ def evaluate_pose(
         )
     output.standard_output().print(table)
     return 0
+
+
+def _trained_on(categories: Collection[str], clouds: Sequence[LabelledCloud]) -> bool | None:
+    """Whether networks of these categories know what clouds show; None: some of it."""
+    known = {cloud.category in categories for cloud in clouds}
+    return known.pop() if len(known) == 1 else None
