@@ -79,7 +79,9 @@ class FurnitureEstimator:
 
         Args:
           clouds: As of `ArticulatedEstimator`.
-          categories: One for each: `"cabinet"`, `"microwave"`, `"oven"`, `"dishwasher"`, ...
+          categories: One for each. `"dishwasher"`, `"microwave"`, `"oven"` and `"washing_machine"` have knobs; doors of
+            `"cabinet"`, `"microwave"` and `"oven"` open as far as is usual for them. Any other name, a misspelt one
+            too, stands for furniture without knobs whose doors open by 100 deg.
           key: Of all that is drawn; the same key gives the same answer.
           up: Roughly which way is up in the camera frame, within some 60 deg.
           least: Confidence from which on a part is reported.
