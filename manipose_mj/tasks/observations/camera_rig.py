@@ -64,7 +64,7 @@ class Frame:
 
 
 class CameraRig:
-    """Renders the configured cameras; noise follows from the episode's seed, camera and time alone.
+    """Renders the configured cameras; noise follows from the episode's seed, the time and a camera's place among them alone.
 
     Attributes:
       names: Of the cameras, as in the model.

@@ -79,7 +79,7 @@ class PoseNoise:
 class SensorConfig:
     """Attributes:
     cameras: Cameras of the scene (`front`, `left`, `right`, `overview`, `panda/wrist`), or your
-      own as `CameraView`.
+      own as `CameraView`. The noise of depth depends on a camera's place among them.
     height, width: Of their images [pixels].
     cloud_size: Points of the cloud that all cameras give together.
     object_cloud_size: Points of the cloud of each object.
