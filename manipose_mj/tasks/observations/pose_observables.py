@@ -1,7 +1,8 @@
 """The mode `pose`: where objects, handles, joint axes and goals are, and their symmetry.
 
 Of each frame, by its name: `pose/NAME` is `T_world_frame`; `pose/robot/NAME` the same in the robot's
-base frame; `pose/cameras/NAME` in each camera's (OpenCV's axes, in the order of the configuration).
+base frame; `pose/cameras/NAME` in each camera's as calibration states it (OpenCV's axes, in the order of the
+configuration).
 `pose/symmetry/NAME` holds the rotations of its symmetry group, `pose/symmetry_count/NAME` how
 many of them count, `pose/axial/NAME` whether every turn about X belongs to the group as well.
 `pose/bounds/NAME` are the lower and the upper corner of an object's bounding box in its frame [m].
@@ -11,7 +12,7 @@ many of them count, `pose/axial/NAME` whether every turn about X belongs to the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,6 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.cameras.ray_camera import camera_pose
 from manipose_mj.mjcf.objects import ArticulatedObject
 from manipose_mj.poses import SymmetryGroup, compose, invert
 from manipose_mj.tasks.goals import GoalFrame
@@ -63,6 +63,7 @@ class PoseObservables:
         robot: composer.Entity,
         slots: Slots,
         cameras: Sequence[str],
+        camera_pose: Callable[[mjcf.Physics, str], Float[np.ndarray, "4 4"]],
         noise: PoseNoise,
         error: FixedError,
     ) -> None:
@@ -73,10 +74,11 @@ class PoseObservables:
           robot: Whose frame is the robot's.
           slots: What there may be to see.
           cameras: In whose frames poses are given as well.
+          camera_pose: `T_world_camera` as calibration states it.
           noise: Of what is not a goal.
           error: Of objects.
         """
-        self._error = error
+        self._error, self._camera_pose = error, camera_pose
         self._scene, self._slots, self._cameras, self._noise = scene, slots, cameras, noise
         self._robot = mjcf.get_attachment_frame(robot.mjcf_model)
         parts = {**furniture_frames(slots.furniture), **scene.extra_frames}
@@ -149,8 +151,7 @@ class PoseObservables:
         base = int(physics.bind(self._robot).element_id)
         T_world_base = compose(data.xmat[base].reshape(3, 3), data.xpos[base])
         robot = invert(T_world_base) @ world
-        model, raw = physics.model.ptr, data.ptr
-        cameras = [invert(camera_pose(model, raw, name)) for name in self._cameras]
+        cameras = [invert(self._camera_pose(physics, name)) for name in self._cameras]
         seen = np.stack([T @ world for T in cameras], axis=1) if cameras else world[:, None][:, :0]
         return world, robot, seen
 

@@ -88,7 +88,7 @@ class SensorConfig:
     pose_noise: Of the observed poses of objects and furniture; goals are exact.
     pose_error: Of each object's observed pose, the same throughout an episode.
     camera_error: Of each camera's stated pose, likewise; images are those of the true one, clouds lie where the
-      stated one puts them.
+      stated one puts them, and poses in a camera's frame are in the stated one.
     renderer: Of `rgb`: `"gl"`, `"ray"`, or `"auto"` for GL where it works. Depth, segmentation and
       clouds are the same everywhere: rays give them.
     """

@@ -88,7 +88,13 @@ class SensorObservables:
         self._robot = instances["robot"]
         self._rig = CameraRig(config, arena, instances)
         self._poses = PoseObservables(
-            scene, self._robot, slots, self._rig.names, config.pose_noise, config.pose_error
+            scene,
+            self._robot,
+            slots,
+            self._rig.names,
+            self._rig.pose,
+            config.pose_noise,
+            config.pose_error,
         )
         self._clouds = CloudObservables(self._rig, config, shaded="rgb" in modes)
         if not self._rig.names and modes & {*_IMAGES, "pointcloud"}:

@@ -39,7 +39,7 @@ def test_an_error_is_not_negative():
 
 def test_numbers_of_numpy_are_sizes():
     assert SensorConfig(camera_error=FixedError(rotation=np.deg2rad(1.0))).camera_error
-    assert not FixedError(np.float32(0.0), np.float64(0.0))
+    assert not FixedError(np.float64(0.0), np.float64(0.0))
 
 
 def test_observed_poses_are_off_by_the_same_in_every_step_and_starts_are_the_same():
@@ -75,6 +75,15 @@ def test_a_wrong_calibration_moves_clouds_and_leaves_images():
     moved = transform(stated @ invert(plain["camera/left/pose"]), plain["pointcloud/points"][own])
     np.testing.assert_allclose(seen["pointcloud/points"][own], moved, atol=1e-5)
     np.testing.assert_array_equal(seen["pointcloud/colours"][own], plain["pointcloud/colours"][own])
+
+
+def test_poses_in_a_cameras_frame_follow_its_stated_pose():
+    wrong = load(TARGET_POSE, "pose+depth", replace(SMALL, camera_error=ERROR), seed=3)
+    seen = wrong.reset().observation
+    for index, camera in enumerate(wrong.task.env_config.sensors.camera_names):
+        for name in ("object", "goal"):
+            stated = seen[f"camera/{camera}/pose"] @ seen[f"pose/cameras/{name}"][index]
+            np.testing.assert_allclose(stated, seen[f"pose/{name}"], atol=1e-9)
 
 
 def test_depth_noise_grows_with_its_factor():
