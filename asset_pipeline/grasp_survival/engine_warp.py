@@ -108,7 +108,7 @@ class Batch:
         data.overflow.zero_()
         self._touching.zero_()
         self._step.zero_()
-        self._mjw.forward(self._model, data)
+        self._mjw.fwd_position(self._model, data)
         wp.launch(
             self._kernels.find_touching,
             data.naconmax,

@@ -44,7 +44,7 @@ class GridTrial(Trial):
     def first_positions(self, grid: TrialGrid) -> Float[np.ndarray, "n 12"]:
         """`qpos` at the beginning of each trial."""
         qpos = np.zeros((len(grid), self._model.nq))
-        qpos[:, BODY] = [pose_to_vector(start) for start in grid.starts]
+        qpos[:, BODY] = pose_to_vector(grid.starts)
         qpos[:, FINGERS] = grid.openings[:, None] / 2
         return qpos
 
