@@ -24,6 +24,13 @@ class ServerAbsentError(InputError):
     """Nobody answers at the address of a method's server, or somebody else does."""
 
 
+def check_count(what: str, value: object, *, least: int = 0) -> None:
+    """Raises InputError for what is no whole number from `least` on; `what` names it in the message."""
+    index = getattr(type(value), "__index__", None)
+    if index is None or isinstance(value, bool) or index(value) < least:
+        raise InputError(f"{what} is {value!r}; expected a whole number, at least {least}")
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str], *, listed_by: str = "") -> InputError:
     """An `InputError` for a misspelt name, offering the nearest valid ones; where none is near, all, if they are few.
 

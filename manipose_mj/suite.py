@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import types
 from dataclasses import replace
 from functools import partial
@@ -11,6 +12,7 @@ import dm_env
 import numpy as np
 from dm_control import composer
 
+from manipose_mj.errors import unknown_name
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
 from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions, check_seed, env_config
 from manipose_mj.tasks.core.environment import TaskEnvironment
@@ -51,8 +53,8 @@ def load(
         `randomisation`, `sensors`, `latency`.
 
     Raises:
-      InputError: An unknown task, observation or control mode, objects that the task cannot use, or a number that is no
-        seed.
+      InputError: An unknown task, observation or control mode, objects that the task cannot use, a number that is no
+        seed, or an argument that `composer.Environment` does not have.
     """
     spec = task_spec(domain, task)
     return make(env_config(spec.full_name, config), seed, environment_kwargs=environment_kwargs)
@@ -66,6 +68,10 @@ def make(
 ) -> composer.Environment:
     """The environment that a configuration describes; arguments as for `load`."""
     spec = named_task(config.task)
+    known = inspect.signature(composer.Environment).parameters
+    for name in environment_kwargs or {}:
+        if name not in known:
+            raise unknown_name("argument of an environment", name, known)
     if seed is not None and not isinstance(seed, np.random.RandomState):
         check_seed(seed)
     return _made(spec, config, seed, environment_kwargs or {})

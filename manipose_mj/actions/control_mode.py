@@ -82,7 +82,7 @@ def checked_action(mode: str, shape: tuple[int, ...], action: object) -> Float[n
       InputError: It has another shape, or a value that is no finite number.
     """
     try:
-        array = np.asarray(action, float)
+        array = np.empty(0) if np.iscomplexobj(action) else np.asarray(action, float)
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.shape != shape or not np.isfinite(array).all():

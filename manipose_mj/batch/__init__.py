@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from manipose_mj.batch.capacity import Capacity
     from manipose_mj.batch.making import from_pool, make
     from manipose_mj.batch.starts import StartPool
-    from manipose_mj.batch.worlds import State, Transition, Worlds
+    from manipose_mj.batch.state import State, Transition
+    from manipose_mj.batch.worlds import Worlds
 
 __all__ = ["Capacity", "StartPool", "State", "Transition", "Worlds", "from_pool", "make"]
 

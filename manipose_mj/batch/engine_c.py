@@ -42,10 +42,8 @@ class CEngine:
           processes: That step them; one: this one.
 
         Raises:
-          InputError: There would be none, or they do not start.
+          InputError: They do not start.
         """
-        if processes < 1:
-            raise InputError(f"processes is {processes}; expected at least 1")
         self._pool, self._worlds = pool, worlds
         processes = min(processes, worlds)
         bounds = np.linspace(0, worlds, processes + 1).astype(int)

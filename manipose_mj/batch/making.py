@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Literal, Unpack
 
 import jax
-import numpy as np
 
 from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
-from manipose_mj.errors import InputError, how_to_install, unknown_name
+from manipose_mj.errors import InputError, check_count, how_to_install, unknown_name
 from manipose_mj.tasks.core.config import EnvOptions, check_seed, env_config
 
 ENGINES = ("auto", "c", "warp")
@@ -59,6 +58,8 @@ def make(
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.
     """
     require_worlds(worlds)
+    if not isinstance(task, str):
+        raise InputError(f'task is {task!r}; expected "domain/name"')
     if seeds is None:
         check_seed(seed)
         seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
@@ -84,6 +85,9 @@ def from_pool(
       InputError: The file holds no pool, or the engine cannot run here.
     """
     require_worlds(worlds)
+    check_count("processes", processes, least=1)
+    if not isinstance(capacity, Capacity | None):
+        raise InputError(f"capacity is {capacity!r}; expected a batch.Capacity, or None")
     chosen = available_engine(engine)
     if isinstance(pool, Path | str):
         pool = StartPool.load(pool)
@@ -96,9 +100,7 @@ def from_pool(
 
 def require_worlds(worlds: int) -> None:
     """Raises InputError where there would be none, or no whole number."""
-    whole = isinstance(worlds, int | np.integer) and not isinstance(worlds, bool)
-    if not whole or worlds < 1:
-        raise InputError(f"worlds is {worlds!r}; expected a whole number, at least 1")
+    check_count("worlds", worlds, least=1)
 
 
 def available_engine(engine: str) -> Literal["c", "warp"]:

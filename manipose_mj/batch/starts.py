@@ -7,6 +7,7 @@ import pickle
 from dataclasses import dataclass
 from pathlib import Path
 
+import jax
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
@@ -122,13 +123,17 @@ class StartPool:
 
     @property
     def digest(self) -> str:
-        """Of what the starts are about: objects, states, models and latencies; equal for equal pools."""
+        """Of what the starts are about: objects, states, models, goals and latencies; equal for equal pools."""
         text = hashlib.sha256()
         for start in self.starts:
             text.update(f"{start.object_name} {start.scene} {start.latency}".encode())
             text.update(np.ascontiguousarray(start.simulation).tobytes())
             for name, values in sorted(start.model.items()):
                 text.update(name.encode() + np.ascontiguousarray(values).tobytes())
+            leaves, structure = jax.tree.flatten((start.goals, start.shapes, start.constants))
+            text.update(str(structure).encode())
+            for leaf in leaves:
+                text.update(np.ascontiguousarray(leaf).tobytes())
         return text.hexdigest()
 
     def rows(self, seeds: list[int]) -> list[int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,77 +11,21 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
-from manipose_mj.batch.commands import Commands, Controller
-from manipose_mj.batch.engine import Engine, Physics
+from manipose_mj.batch.commands import Controller
+from manipose_mj.batch.engine import Engine
 from manipose_mj.batch.goals import EpisodeGoals, stack_trees, take
 from manipose_mj.batch.measurement import Measurement, scene_state
 from manipose_mj.batch.observations import Observation, Observer
 from manipose_mj.batch.starts import StartPool
-from manipose_mj.errors import InputError
+from manipose_mj.batch.state import State, Transition, read_state, write_state
+from manipose_mj.errors import InputError, check_count
 from manipose_mj.poses import Array
-from manipose_mj.storage.cache_file import new_cache_file
 from manipose_mj.tasks.core.config import check_seed
+from manipose_mj.tasks.core.task import CONTROL_TIMESTEP, SUCCESS_HELD
+
+_HELD = round(SUCCESS_HELD / CONTROL_TIMESTEP)  # control steps
 
 Policy = Callable[[Observation, PRNGKeyArray], Float[Array, "worlds n"]]
-
-
-class State(NamedTuple):
-    """All worlds between two control steps.
-
-    Where an episode ended with the last step, `observation` is already the next one's first; everything else
-    about the step is of the episode that ended.
-
-    Attributes:
-      observation: By the names that the CPU task has.
-      final_observation: The same after the last step, before a new episode began.
-      reward: Of the last step.
-      terminated: Whether the episode ended because the simulation diverged, which is the failure `physics`.
-      truncated: Whether it ended at the horizon.
-      success: Whether the goals were met after the last step.
-      success_once: Whether they were after any step of the episode.
-      overflowed: Whether the engine met a limit at any step of the episode, such as its room for contacts: its
-        physics does not count.
-      row: Of each world's start in the pool.
-      count: Control steps of the present episode.
-      succeeded: Whether its goals were met after any of them.
-      streak: After how many of the last ones they were, without a break.
-      simulation: The engine's.
-      measurement: Of it.
-      commands: What the controllers remember.
-    """
-
-    observation: Observation
-    final_observation: Observation
-    reward: Float[Array, " worlds"]
-    terminated: Bool[Array, " worlds"]
-    truncated: Bool[Array, " worlds"]
-    success: Bool[Array, " worlds"]
-    success_once: Bool[Array, " worlds"]
-    overflowed: Bool[Array, " worlds"]
-    row: Int[Array, " worlds"]
-    count: Int[Array, " worlds"]
-    succeeded: Bool[Array, " worlds"]
-    streak: Int[Array, " worlds"]
-    simulation: Physics
-    measurement: Measurement
-    commands: Commands
-
-    @property
-    def done(self) -> Bool[Array, " worlds"]:
-        """Whether an episode ended with the last step."""
-        return self.terminated | self.truncated
-
-
-class Transition(NamedTuple):
-    """What a rollout keeps of each step; as in `State`."""
-
-    action: Float[Array, "*steps worlds n"]
-    reward: Float[Array, "*steps worlds"]
-    terminated: Bool[Array, "*steps worlds"]
-    truncated: Bool[Array, "*steps worlds"]
-    success: Bool[Array, "*steps worlds"]
-    success_once: Bool[Array, "*steps worlds"]
-    overflowed: Bool[Array, "*steps worlds"]
 
 
 class _Unseen(NamedTuple):
@@ -115,13 +58,15 @@ class Worlds:
         self._simulations = engine.starts()
         self._observer, self._controller = Observer(pool), Controller(pool)
         self.lower, self.upper = self._controller.lower, self._controller.upper
-        self._begin_jit = jax.jit(self._begin)
+        self._closed = False
+        self._begin_jit, self._replay_jit = jax.jit(self._begin), jax.jit(self._replayed)
         self._step_jit, self._unseen_jit = (
             jax.jit(step, static_argnums=2) for step in (self._step, self._unseen_step)
         )
 
     def reset(self, key: PRNGKeyArray) -> State:
         """Begin an episode in every world, each start of the pool equally often."""
+        self._require_open()
         rows = jax.random.permutation(key, len(self.pool.starts))
         return self._begin_jit(jnp.resize(rows, (self.count,)))
 
@@ -134,6 +79,8 @@ class Worlds:
         Raises:
           InputError: They are more or fewer, one is none, or the pool has no such start.
         """
+        self._require_open()
+        seeds = seeds.tolist() if isinstance(seeds, np.ndarray | jax.Array) else seeds
         if np.ndim(seeds) != 1:
             raise InputError(f"seeds is {seeds!r}; expected a sequence with one a world")
         if len(seeds) != self.count:
@@ -156,13 +103,12 @@ class Worlds:
             fewer actions a second; no longer than to the horizon. The reward is the last one's.
 
         Raises:
-          InputError: Actions have another shape, or `hold` is no positive whole number.
+          InputError: Actions are no numbers or have another shape, `hold` is no positive whole number, or the worlds
+            were closed.
         """
-        if not isinstance(hold, int | np.integer) or hold < 1:
-            raise InputError(
-                f"hold is {hold!r}; expected a whole number of control steps from 1 on"
-            )
-        self.check_shape(jnp.shape(action))
+        self._require_open()
+        check_count("hold", hold, least=1)
+        self.check_actions(action)
         return self._step_jit(state, action, hold)
 
     def rollout(
@@ -175,17 +121,23 @@ class Worlds:
     ) -> tuple[State, Transition]:
         """Many control steps in one `scan`.
 
+        Outside `jax.jit` a policy is compiled in every call.
+
         Args:
-          policy: A function of the observation and a key, or recorded actions.
+          policy: A pure function of the observation and a key, or recorded actions.
           state: To begin with.
           steps: How many; all of recorded actions by default.
           key: For the policy.
 
         Raises:
-          InputError: A policy is given without `steps`, there are fewer actions, or they have another shape.
+          InputError: A policy is given without `steps`, there are fewer actions, or they have another shape; steps is no
+            whole number, or key no key.
         """
-        if steps is not None and steps < 0:
-            raise InputError(f"steps is {steps}; expected at least 0")
+        self._require_open()
+        if steps is not None:
+            check_count("steps", steps)
+        if key is not None and not hasattr(key, "dtype"):
+            raise InputError(f"key is {key!r}; expected a key such as jax.random.key(0)")
         if callable(policy):
             if steps is None:
                 raise InputError("a rollout of a policy needs the number of steps")
@@ -193,23 +145,19 @@ class Worlds:
 
             def act_and_step(state: State, own: Array) -> tuple[State, Transition]:
                 action: Any = policy(state.observation, own)
-                self.check_shape(jnp.shape(action))
+                self.check_actions(action)
                 after = self._step_jit(state, action, 1)
-                return after, _transition(action, after)
+                return after, Transition.of(action, after)
 
             return jax.lax.scan(act_and_step, state, keys)
 
-        def step(going: _Unseen, action: Array) -> tuple[_Unseen, Transition]:
-            after = self._unseen_jit(going.state, action, 1)
-            return after, _transition(action, after.state)
-
         recorded = jnp.asarray(policy)
-        self.check_shape(recorded.shape[1:])
+        self.check_actions(recorded, recorded.shape[1:])
         if steps is not None and steps > len(recorded):
             raise InputError(f"steps is {steps}; the recording has {len(recorded)} actions")
         # Nobody looks before the last step.
         blind = _Unseen(_without_observations(state), state.measurement, state.row)
-        last, seen = jax.lax.scan(step, blind, recorded[:steps])
+        last, seen = self._replay_jit(blind, recorded[:steps])
         return (self._seen(last) if len(seen.reward) else state), seen
 
     def seeds(self, state: State) -> Int[np.ndarray, " worlds"]:
@@ -218,11 +166,7 @@ class Worlds:
 
     def save(self, state: State, path: Path | str) -> None:
         """Write a state to a file (`.npz`)."""
-        leaves: dict[str, Any] = {
-            f"leaf_{i}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))
-        }
-        with new_cache_file(Path(path)) as scratch, scratch.open("wb") as file:
-            np.savez(file, **self._identity(), **leaves)
+        write_state(Path(path), self._identity(), state)
 
     def restore(self, path: Path | str) -> State:
         """The state that was saved, by worlds of the same task, options, starts and number.
@@ -230,38 +174,30 @@ class Worlds:
         Raises:
           InputError: There is none, or it is of other worlds.
         """
-        try:
-            with np.load(path) as file:
-                saved = {name: file[name] for name in file.files}
-        except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            raise InputError(f"{path}: no state of worlds can be read from it ({error})") from None
-        for name, own in self._identity().items():
-            if name not in saved or not np.array_equal(saved[name], own):
-                raise InputError(
-                    f"{path}: its {name} differ from these worlds'; make them with the same arguments"
-                )
-        shape = jax.eval_shape(self._begin, jnp.zeros(self.count, jnp.int32))
-        names = [f"leaf_{i}" for i in range(len(jax.tree.leaves(shape)))]
-        if not saved.keys() >= {*names}:
-            raise InputError(f"{path}: no state of worlds can be read from it (parts are missing)")
-        leaves = [jnp.asarray(saved[name]) for name in names]
-        return jax.tree.unflatten(jax.tree.structure(shape), leaves)
+        shapes = jax.eval_shape(self._begin, jnp.zeros(self.count, jnp.int32))
+        return read_state(path, self._identity(), shapes)
 
     def close(self) -> None:
-        """Free what the engine holds."""
+        """Free what the engine holds; nothing can be stepped afterwards."""
+        self._closed = True
         self.engine.close()
 
-    def check_shape(self, shape: tuple[int, ...]) -> None:
-        """Raises InputError where actions of this shape are not one a world."""
+    def check_actions(self, actions: Any, shape: tuple[int, ...] | None = None) -> None:
+        """Raises InputError where actions are complex or not one a world; `shape` is that of one step's, if they are more."""
+        shape = jnp.shape(actions) if shape is None else shape
         expected = (self.count, len(self.lower))
         if shape != expected:
             raise InputError(f"the actions of a step have shape {shape}; expected {expected}")
+        if jnp.iscomplexobj(actions):
+            raise InputError("the actions of a step are complex; expected real numbers")
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise InputError("these worlds were closed; make new ones")
 
     def _identity(self) -> dict[str, Any]:
-        layout = self.pool.layout
-        options = (layout.task, layout.obs_mode, layout.control_mode, layout.reward_mode)
         return {
-            "options": np.array([*options, self.engine.name]),
+            "options": np.array([repr(self.pool.layout), self.engine.name]),
             "seeds": np.array(self.pool.seeds),
             "starts": np.array(self.pool.digest),
             "worlds": np.array(self.count),
@@ -289,6 +225,7 @@ class Worlds:
             count=jnp.zeros(len(rows), jnp.int32),
             succeeded=never,
             streak=jnp.zeros(len(rows), jnp.int32),
+            held_at=jnp.zeros(len(rows), jnp.int32),
             simulation=take(self._simulations, rows),
             measurement=now,
             commands=self._controller.begin(rows, now.joints, now.fingers.sum(-1)),
@@ -306,6 +243,17 @@ class Worlds:
             observation=_choose(state.done, first, final), final_observation=final
         )
 
+    def _replayed(
+        self, begun: _Unseen, actions: Float[Array, "steps worlds n"]
+    ) -> tuple[_Unseen, Transition]:
+        """The end of recorded actions, and what was on the way."""
+
+        def step(going: _Unseen, action: Array) -> tuple[_Unseen, Transition]:
+            after = self._unseen_jit(going.state, action, 1)
+            return after, Transition.of(action, after.state)
+
+        return jax.lax.scan(step, begun, actions)
+
     def _unseen_step(self, state: State, action: Float[Array, "worlds n"], hold: int) -> _Unseen:
         """One control step of states without observations."""
         layout, rows = self.pool.layout, state.row
@@ -315,7 +263,9 @@ class Worlds:
         commands, targets = self._controller.command(
             state.commands, rows, action, state.measurement.joints
         )
-        going_on = self._advanced(state._replace(commands=commands, terminated=~valid), targets)
+        held_at = jnp.where(state.done, 0, state.held_at)
+        begun = state._replace(commands=commands, terminated=~valid, held_at=held_at)
+        going_on = self._advanced(begun, targets)
         if hold > 1:
 
             def held(state: State, _: None) -> tuple[State, None]:
@@ -355,13 +305,17 @@ class Worlds:
         now = _choose(diverged, state.measurement, now)
         scene = scene_state(layout.objects, layout.parts, take(self._shapes, rows), now)
         success = self._goals.success(rows, scene, layout.tolerance) & ~diverged
+        streak = jnp.where(success, state.streak + 1, 0)
+        count = state.count + 1
+        held_now = (streak >= _HELD) & (state.held_at == 0)
         return state._replace(
             reward=self._goals.reward(rows, scene, layout.tolerance, layout.reward_mode),
             terminated=diverged,
             success=success,
-            count=state.count + 1,
+            count=count,
             succeeded=state.succeeded | success,
-            streak=jnp.where(success, state.streak + 1, 0),
+            streak=streak,
+            held_at=jnp.where(held_now, count, state.held_at),
             simulation=simulation,
             measurement=now,
         )
@@ -369,18 +323,6 @@ class Worlds:
 
 def _without_observations(state: State) -> State:
     return state._replace(observation={}, final_observation={})
-
-
-def _transition(action: Array, after: State) -> Transition:
-    return Transition(
-        action,
-        after.reward,
-        after.terminated,
-        after.truncated,
-        after.success,
-        after.success_once,
-        after.overflowed,
-    )
 
 
 def _choose(which: Bool[Array, " worlds"], yes: Any, no: Any) -> Any:

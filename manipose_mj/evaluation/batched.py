@@ -15,12 +15,13 @@ from jaxtyping import Float
 
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import available_engine, from_pool
-from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.batch.state import State
+from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
 from manipose_mj.evaluation.policy_settings import CONTROL_HZ, PolicySettings
 from manipose_mj.evaluation.records import EpisodeResult
-from manipose_mj.evaluation.rollout import ROUNDING, SUCCESS_HELD
+from manipose_mj.evaluation.rollout import ROUNDING
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.policies.protocol import NOT_FINITE, ActionSpace
 from manipose_mj.poses import Array
@@ -43,7 +44,7 @@ class _Ends:
     """How the episodes ended, by world.
 
     Attributes: ended; success; once; diverged; overflowed; invalid, by an action that is no finite number; steps,
-      control steps until then; clipped, actions.
+      control steps until then; decisions, actions until then; clipped, of these.
     """
 
     ended: np.ndarray
@@ -53,6 +54,7 @@ class _Ends:
     overflowed: np.ndarray
     invalid: np.ndarray
     steps: np.ndarray
+    decisions: np.ndarray
     clipped: np.ndarray
 
 
@@ -85,7 +87,7 @@ def batched_results(
             for world, row in enumerate(rows):
                 name = pool.starts[row].object_name
                 seconds = pool.layout.timestep * pool.layout.substeps
-                yield _result(config, task, numbers[row], name, ends, world, seconds, hold, wall_s)
+                yield _result(config, task, numbers[row], name, ends, world, seconds, wall_s)
         worlds.close()
 
 
@@ -124,33 +126,33 @@ def _played(
 ) -> _Ends:
     """Play until all episodes of these seeds have ended."""
     horizon = worlds.pool.layout.horizon
-    enough = round(SUCCESS_HELD * CONTROL_HZ) if settings.stop == "success" else horizon + 1
     several = _several(worlds, policy, settings.name, hold)
     state, ends = worlds.at(seeds), _no_ends(worlds.count)
     taken = 0
     while not ends.ended.all():
-        state, (looks, clipped, invalid) = several(state)
-        rows = zip(_unstacked(looks), np.asarray(clipped), np.asarray(invalid), strict=True)
-        for i, (now, over, no_action) in enumerate(rows):
-            steps = (taken + i + 1) * hold
+        state, (looks, clipped, invalid, before) = several(state)
+        rows = zip(_unstacked(looks), *map(np.asarray, (clipped, invalid, before)), strict=True)
+        for i, (now, over, no_action, success_before) in enumerate(rows):
             playing = ~ends.ended
             ends.clipped += playing & over
-            held = now["streak"] >= enough
+            held = (now["held_at"] > 0) & (settings.stop == "success")
             ending = playing & (now["terminated"] | now["truncated"] | held)
             ends.once |= playing & now["success_once"]
-            ends.success = np.where(ending, now["success"] | held, ends.success)
-            ends.diverged = np.where(ending, now["terminated"], ends.diverged)
+            # An action that is none is not carried out: what was so before it stays.
+            success = np.where(no_action, success_before, now["success"])
+            ends.success = np.where(ending, success | held, ends.success)
+            ends.diverged |= ending & now["terminated"] & ~held
             ends.overflowed |= playing & now["overflowed"]
-            ends.invalid |= ending & no_action & now["terminated"]
-            early = np.where(held, now["streak"] - enough, 0)
-            early = np.where(ends.invalid & ending, hold, early)  # it was not carried out
-            ends.steps = np.where(ending, np.minimum(steps, horizon) - early, ends.steps)
+            ends.invalid |= ending & no_action
+            steps = np.minimum((taken + i + 1 - no_action) * hold, horizon)
+            ends.steps = np.where(ending, np.where(held, now["held_at"], steps), ends.steps)
+            ends.decisions = np.where(ending, taken + i + 1, ends.decisions)
             ends.ended |= ending
         taken += _LOOK_EVERY
     return ends
 
 
-_LOOKED_AT = ("terminated", "truncated", "success", "success_once", "overflowed", "streak")
+_LOOKED_AT = ("terminated", "truncated", "success", "success_once", "overflowed", "held_at")
 
 
 def _several(
@@ -170,7 +172,7 @@ def _several(
         beyond = jnp.abs(jnp.clip(action, worlds.lower, worlds.upper) - action).max(-1)
         after = worlds.step(state, action, hold)
         looks = {name: getattr(after, name) for name in _LOOKED_AT}
-        return after, (looks, beyond > ROUNDING, invalid)
+        return after, (looks, beyond > ROUNDING, invalid, state.success)
 
     return jax.jit(lambda state: jax.lax.scan(one, state, length=_LOOK_EVERY))
 
@@ -196,7 +198,10 @@ def _no_ends(count: int) -> _Ends:
     def no() -> np.ndarray:
         return np.zeros(count, bool)
 
-    return _Ends(no(), no(), no(), no(), no(), no(), np.zeros(count, int), np.zeros(count, int))
+    def none() -> np.ndarray:
+        return np.zeros(count, int)
+
+    return _Ends(no(), no(), no(), no(), no(), no(), none(), none(), none())
 
 
 def _result(
@@ -207,7 +212,6 @@ def _result(
     ends: _Ends,
     world: int,
     control_timestep: float,
-    hold: int,
     wall_s: float,
 ) -> EpisodeResult:
     steps, success = int(ends.steps[world]), bool(ends.success[world])
@@ -238,6 +242,6 @@ def _result(
         sim_time=round(steps * control_timestep, 6),
         max_penetration=None,
         wall_s=wall_s,
-        decisions=-(-steps // hold),
+        decisions=int(ends.decisions[world]),
         clipped_actions=int(ends.clipped[world]),
     )

@@ -16,8 +16,8 @@ from manipose_mj.evaluation.policy_settings import CONTROL_HZ, Stop
 from manipose_mj.failures import StageFailure
 from manipose_mj.policies.protocol import Decision, Policy, answered_width, checked_answer
 from manipose_mj.tasks.core.environment import TaskEnvironment
+from manipose_mj.tasks.core.task import SUCCESS_HELD
 
-SUCCESS_HELD = 0.5  # for how long a goal must hold until `stop="success"` ends an episode [s]
 ROUNDING = 1e-6  # beyond a limit that counts as at it: policies compute in float32
 
 Observe = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]

@@ -12,7 +12,8 @@ from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.batch.state import State
+from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import check_seed
 
@@ -137,9 +138,10 @@ def _array(actions: Any) -> np.ndarray | jax.Array:
     if hasattr(actions, "__dlpack__") and not isinstance(actions, np.ndarray):
         return jax.numpy.from_dlpack(actions)
     try:
-        if np.iscomplexobj(actions):
+        given = np.asarray(actions)
+        if given.dtype.kind in "cO":  # None would become no number
             raise TypeError
-        return np.asarray(actions, np.float32)
+        return given.astype(np.float32)
     except (TypeError, ValueError):
         raise InputError(f"actions are no numbers in equal rows: {actions!r:.80}") from None
 

@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from manipose_mj.batch.observations import Observation
-from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.batch.state import State
+from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError
 from manipose_mj.poses import Array
 
@@ -38,6 +39,10 @@ class BraxState(NamedTuple):
     done: Float[Array, " worlds"]
     metrics: dict[str, Array]
     info: dict[str, Any]
+
+    def replace(self, **changes: Any) -> BraxState:
+        """The state with other values of some attributes, as of Brax's."""
+        return self._replace(**changes)
 
     @property
     def pipeline_state(self) -> State:
@@ -73,10 +78,10 @@ class BraxWorlds:
         Raises:
           InputError: There are neither one key nor as many as worlds.
         """
-        if not hasattr(rng, "dtype"):
-            raise InputError(f"{rng!r} is no key; expected jax.random.key(0), or one a world")
+        typed = hasattr(rng, "dtype") and jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
         shape = np.shape(rng)
-        typed = jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
+        if not typed and (shape[-1:] != (2,) or rng.dtype != jnp.uint32):
+            raise InputError(f"{rng!r} is no key; expected jax.random.key(0), or one a world")
         keys = shape if typed else shape[:-1]
         if keys not in ((), (self.worlds.count,)):
             raise InputError(
@@ -91,7 +96,7 @@ class BraxWorlds:
         Raises:
           InputError: The actions have another shape.
         """
-        self.worlds.check_shape(np.shape(action))
+        self.worlds.check_actions(action)
         low, high = self.worlds.lower, self.worlds.upper
         bounded = jnp.clip(action, -1.0, 1.0)
         after = self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low))

@@ -137,10 +137,10 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         self._require_open()
         if not self._running:
             raise ResetNeeded("the episode is over, or none was started: call reset first")
+        mode, shape = self.environment.task.control_mode, self.environment.action_spec().shape
+        action = checked_action(mode.name, shape, action)
         if self._unscaled is not None:
-            name = self.environment.task.control_mode.name
-            shape = self.environment.action_spec().shape
-            action = self._unscaled(checked_action(name, shape, action))
+            action = self._unscaled(action)
         step = self.environment.step(action)
         terminated = step.last() and step.discount == 0.0
         if self._terminate_on_success and self.environment.task.success_now:

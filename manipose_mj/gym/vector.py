@@ -6,11 +6,10 @@ from functools import partial
 from typing import Any
 
 import gymnasium
-import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers import TimeLimit
 
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import check_count, unknown_name
 from manipose_mj.gym.env import ManiPoseEnv
 from manipose_mj.tasks.core.registry import named_task
 
@@ -36,10 +35,9 @@ def make_vector(
     Raises:
       InputError: There would be none, or no number of them, or an option is unknown.
     """
-    if not isinstance(num_envs, int | np.integer) or num_envs < 1:
-        raise InputError(f"num_envs is {num_envs}; expected a whole number, at least 1")
-    if max_episode_steps is not None and max_episode_steps < 1:
-        raise InputError(f"max_episode_steps is {max_episode_steps}; expected at least 1")
+    check_count("num_envs", num_envs, least=1)
+    if max_episode_steps is not None:
+        check_count("max_episode_steps", max_episode_steps, least=1)
     try:
         autoreset = AutoresetMode(autoreset_mode)
     except ValueError:

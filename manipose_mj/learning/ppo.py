@@ -19,7 +19,9 @@ import optax
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.batch.observations import Observation
-from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.batch.state import State
+from manipose_mj.batch.worlds import Worlds
+from manipose_mj.errors import InputError
 from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
 
 Features = Callable[[Observation], Float[Array, "worlds n"]]
@@ -134,8 +136,16 @@ class Ppo:
           command: The worlds' action, of an observation and the policy's action.
           actions: Numbers in the latter.
           config: How to learn.
+
+        Raises:
+          InputError: The worlds' actions in an update are fewer than its minibatches.
         """
         self.config = config or PpoConfig()
+        if worlds.count * self.config.steps < self.config.minibatches:
+            raise InputError(
+                f"{worlds.count} worlds are too few for {self.config.minibatches} minibatches of "
+                f"{self.config.steps} actions each"
+            )
         self._worlds, self._features, self._command = worlds, features, command
         self._actions = actions
         self._optimiser = optax.chain(

@@ -73,7 +73,8 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
     """The starts, read from a file if it is there, otherwise drawn and written to it.
 
     Raises:
-      InputError: The task is none that can be trained, or the file is of another one.
+      InputError: The task is none that can be trained, an episode is shorter than an action, or the file is of another
+        task.
     """
     if path is not None and path.exists():
         pool = StartPool.load(path)
@@ -97,7 +98,12 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
         raise InputError(f"{path}: its starts are of another task or mode; draw them again")
     frame_of(config.task, layout.frames)
     # Episodes are shorter than the task's.
-    steps = round(config.episode / (layout.timestep * layout.substeps))
+    control_timestep = layout.timestep * layout.substeps
+    steps = round(config.episode / control_timestep)
+    if steps < config.ppo.hold:
+        raise InputError(
+            f"episode is {config.episode:g} s; expected the time of an action at least, {config.ppo.hold * control_timestep:g} s"
+        )
     return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
 
 
@@ -146,8 +152,6 @@ def train(
     """
     ppo = config.ppo
     before = None if config.policy is None else Trained.load(config.policy)
-    if config.worlds * ppo.steps < ppo.minibatches:
-        raise InputError(f"{config.worlds} worlds are too few for {ppo.minibatches} minibatches")
     name = frame_of(config.task, pool.layout.frames)
     if before is not None and before.frame != name:
         raise InputError(
@@ -176,7 +180,7 @@ def train(
         rows.append(row)
         on_progress(row)
         trained = _trained(config, pool, learner)
-        _write(out, trained, config, rows)
+        _write(out, trained, config, pool, rows)
         enough = config.until is not None and row["succeeded"] >= config.until
         if enough or row["seconds"] > 60 * config.minutes:
             break
@@ -218,11 +222,17 @@ def _row(progress: Progress) -> Row:
     return {name: float(value) for name, value in row.items()}
 
 
-def _write(out: Path, trained: Trained, config: TrainingConfig, rows: list[Row]) -> None:
+def _write(
+    out: Path, trained: Trained, config: TrainingConfig, pool: StartPool, rows: list[Row]
+) -> None:
     out.mkdir(parents=True, exist_ok=True)
     trained.save(out / POLICY_FILE)
     said: dict[str, Any] = asdict(config)
     said["policy"] = None if config.policy is None else str(config.policy)
-    said["objects"] = None if config.objects is None else [str(each) for each in config.objects]
+    # Of the starts that there were: those of a pool that was read may be others than the configuration's.
+    for name in ("starts", "first_start", "objects"):
+        del said[name]
+    objects = sorted({start.object_name for start in pool.starts})
+    starts = {"seeds": list(pool.seeds), "objects": objects}
     with new_cache_file(out / CURVE_FILE) as scratch:
-        scratch.write_text(json.dumps({"config": said, "rows": rows}, indent=1))
+        scratch.write_text(json.dumps({"config": said, "starts": starts, "rows": rows}, indent=1))

@@ -11,7 +11,7 @@ import numpy as np
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import EngineName, available_engine, from_pool
 from manipose_mj.batch.starts import StartPool
-from manipose_mj.batch.worlds import Transition
+from manipose_mj.batch.state import Transition
 from manipose_mj.errors import InputError
 from manipose_mj.robustness.plans import Plans
 from manipose_mj.robustness.variation import Variation, Varied

@@ -103,10 +103,12 @@ def test_rollouts_are_steps_also_from_states_in_between(worlds):
     for action in actions:
         states.append(worlds.step(states[-1], action))
         rewards.append(states[-1].reward)
-    last, seen = jax.jit(lambda state: worlds.rollout(actions, state))(state)
+    last, seen = worlds.rollout(actions, state)
     equal(last.simulation, states[-1].simulation)
     equal(seen.reward, np.stack(rewards))
     assert np.asarray(seen.truncated).sum() == 3
+    worlds.rollout(actions[::-1], state)
+    assert worlds._replay_jit._cache_size() == 1  # the recording is none of the program
     again = worlds.step(worlds.step(states[4], actions[4]), actions[5])
     equal(again.simulation, states[-1].simulation)
 
@@ -114,7 +116,7 @@ def test_rollouts_are_steps_also_from_states_in_between(worlds):
         home = observation["panda/joint_positions"]
         return jnp.concatenate([home, observation["panda/gripper_opening"]], axis=-1)
 
-    last, seen = worlds.rollout(hold, state, 2)
+    last, seen = jax.jit(lambda state: worlds.rollout(hold, state, 2))(state)
     assert seen.action.shape == (2, 3, 8) and np.asarray(last.count).tolist() == [2, 2, 2]
 
 
@@ -132,14 +134,49 @@ def test_a_saved_state_goes_on_alike_in_other_worlds(worlds, tmp_path):
     others = batch.from_pool(replace(worlds.pool, starts=tuple(moved)), 3, "c")
     with pytest.raises(InputError, match="its starts differ"):
         others.restore(file)
+    later = replace(worlds.pool, layout=replace(worlds.pool.layout, horizon=3))
+    with pytest.raises(InputError, match="its options differ"):
+        batch.from_pool(later, 3, "c").restore(file)
+    other_goals = [replace(each, goals=each.goals * 2) for each in worlds.pool.starts]
+    assert replace(worlds.pool, starts=tuple(other_goals)).digest != worlds.pool.digest
     file.write_bytes(b"nothing")
     with pytest.raises(InputError, match="no state of worlds"):
         other.restore(file)
     worlds.save(state, file)
     with np.load(file) as saved:
-        np.savez(file, **{name: saved[name] for name in saved.files if name != "leaf_2"})
-    with pytest.raises(InputError, match="parts are missing"):
-        other.restore(file)
+        kept = {name: saved[name] for name in saved.files}
+    for leaf in ({}, {"leaf_2": kept["leaf_2"][:, :1]}, {"leaf_2": kept["leaf_2"].astype(int)}):
+        np.savez(file, **{name: kept[name] for name in kept if name != "leaf_2"}, **leaf)
+        with pytest.raises(InputError, match="missing or have other shapes"):
+            other.restore(file)
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("processes", [1, 2])
+def test_closed_worlds_say_so(worlds, processes):
+    closed = batch.from_pool(worlds.pool, 3, "c", processes=processes)
+    state, action = closed.at(np.array([7, 8, 7])), wandering(1, 3)[0]
+    closed.close()
+    late = (
+        lambda: closed.step(state, action),
+        lambda: closed.rollout(action[None], state),
+        lambda: closed.at([7, 8, 7]),
+        lambda: closed.reset(jax.random.key(0)),
+    )
+    for call in late:
+        with pytest.raises(InputError, match="these worlds were closed"):
+            call()
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_what_can_be_no_step_is_refused(worlds):
+    state, action = worlds.at(jnp.array([7, 8, 7])), wandering(1, 3)[0]
+    with pytest.raises(InputError, match="actions of a step are complex"):
+        worlds.step(state, action + 0j)
+    with pytest.raises(InputError, match=r"steps is 2.5; expected a whole number"):
+        worlds.rollout(lambda observation, key: action, state, cast(Any, 2.5))
+    with pytest.raises(InputError, match="key is 3; expected a key"):
+        worlds.rollout(lambda observation, key: action, state, 1, key=cast(Any, 3))
 
 
 def test_reset_takes_every_start_equally_often(worlds):
@@ -227,7 +264,7 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
         with pytest.raises(InputError, match=message):
             worlds.rollout(wandering(2, 3), state, steps)
     for hold in (0, -3):
-        with pytest.raises(InputError, match="expected a whole number of control steps"):
+        with pytest.raises(InputError, match="hold is .*; expected a whole number, at least 1"):
             worlds.step(state, np.zeros((3, 8)), hold)
 
 

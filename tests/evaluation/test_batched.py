@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jax
@@ -16,10 +16,18 @@ from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.batched import batched_results
 from manipose_mj.evaluation.config import BatchSettings, EvaluationConfig
+from manipose_mj.evaluation.injected_errors import InjectedErrors
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
 from manipose_mj.learning import grip, handle_frame
-from manipose_mj.poses import invert, vector_to_pose
+from manipose_mj.mjcf.panda.robot import HOME
+from manipose_mj.poses import compose, invert, vector_to_pose
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, TaskConfig
+from manipose_mj.tasks.core.preview import Preview
+from manipose_mj.tasks.core.start import EpisodeStart, PlacedObject
+from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.goals import Goal
+from tests.conformance.own_tasks import registered
 
 TASK = "articulated/open_middle_drawer"
 _NEAR, _SHUT = 0.03, 0.03
@@ -119,13 +127,89 @@ def test_verdicts_are_those_of_single_environments(tmp_path, stop):
     assert again == together
 
 
+@dataclass(frozen=True)
+class HighGoal(Goal):
+    """The gripper above a height."""
+
+    object: str
+    height: float = 0.33
+
+    def met(self, state, tolerance):
+        return state.tcp_pose[..., 2, 3] > self.height
+
+    def progress(self, state, tolerance):
+        return state.tcp_pose[..., 2, 3].clip(0, 1)
+
+
+class HighTask(ManipulationTask):
+    """A goal that the arm has met before it moves."""
+
+    def __init__(self, env_config: EnvConfig) -> None:
+        super().__init__(TaskConfig(horizon=4.0), env_config)
+        self.pool = self.scene.add_objects(env_config.assets())
+
+    def sample(self, rng, spec: EpisodeSpec, preview: Preview) -> EpisodeStart:
+        rest = self.pool.entities[0].asset.stable_poses[0]
+        pose = compose(rest.rotation, np.array([0.5, 0.0, rest.height]))
+        return EpisodeStart(goals=(HighGoal("object"),), objects={"object": PlacedObject(0, pose)})
+
+
+class Lowering(Alone):
+    """Goes down."""
+
+    def infer(self, obs):
+        return {"actions": np.asarray(self.act({"panda/joint_positions": HOME[None]}))}
+
+    def act(self, observation):
+        low = jnp.array([0.0, 1.2, 0.0, -2.0, 0.0, 3.2, 0.8, 0.08])
+        return jnp.tile(low, (len(observation["panda/joint_positions"]), 1))
+
+
+class Silent(Alone):
+    """Shuts the gripper and answers no numbers then."""
+
+    def infer(self, obs):
+        seen = {name: np.asarray(obs[name])[None] for name in obs if name.startswith("panda/")}
+        return {"actions": np.asarray(self.act(seen), float)}
+
+    def act(self, observation):
+        joints = jnp.asarray(observation["panda/joint_positions"])
+        shut = observation["panda/gripper_opening"][:, :1] < 0.05
+        return jnp.where(shut, jnp.nan, jnp.pad(joints, ((0, 0), (0, 1))))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("policy", "hz", "stop", "latency"),
+    [("Lowering", 1.0, "success", 600.0), ("Silent", 10.0, "horizon", 0.0)],
+)
+def test_what_holds_while_an_action_is_held_counts(policy, hz, stop, latency, tmp_path):
+    """The gripper is high for half a second, and low when the action ends; or the policy ends while it is high."""
+    with registered("high", HighTask) as name:
+        alone = EvaluationConfig(
+            ("/".join(name),),
+            tmp_path / "alone",
+            episodes=1,
+            objects=("box_000",),
+            policy=PolicySettings(
+                f"tests.evaluation.test_batched:{policy}", hz=hz, stop=stop, obs_mode="state"
+            ),
+            errors=InjectedErrors(latency_ms=latency),
+        )
+        (one,) = evaluate(alone)
+        (other,) = evaluate(replace(alone, out=tmp_path / "many", batch=BatchSettings("c", 1)))
+    assert one.success_at_end
+    for field in ("failure", "reason", "steps", "success_at_end", "success_once", "decisions"):
+        assert getattr(one, field) == getattr(other, field), field
+
+
 @pytest.mark.full
 def test_what_is_no_number_is_the_policys_failure_in_one_world_and_in_many(tmp_path):
     alone = evaluate(config(tmp_path / "alone", "Nothing", None))
     together = evaluate(config(tmp_path / "together", "Nothing", BatchSettings("c", 2)))
     for one, other in zip(alone, together, strict=True):
         assert one.failure == "policy" and one.steps == 0
-        for name in ("failure", "reason", "steps", "success_at_end", "success_once"):
+        for name in ("failure", "reason", "steps", "success_at_end", "success_once", "decisions"):
             assert getattr(one, name) == getattr(other, name), name
 
 

@@ -120,7 +120,8 @@ def test_all_kinds_of_actions_share_one_compiled_step(env):
 
 
 @pytest.mark.parametrize(
-    "actions", ["left", None, [[0.0] * 8, [0.0] * 7], [["a"] * 8] * 2, [[1j] * 8] * 2]
+    "actions",
+    ["left", None, [[0.0] * 8, [0.0] * 7], [["a"] * 8] * 2, [[1j] * 8] * 2, [[None] * 8] * 2],
 )
 def test_what_is_no_action_is_refused(env, actions):
     env.reset(seed=0)

@@ -58,8 +58,11 @@ def test_keys_are_one_or_one_a_world(env):
     assert not all(np.array_equal(each, begun[0]) for each in begun)
     with pytest.raises(InputError, match=r"keys of shape \(3,\) for 2 worlds"):
         env.reset(jax.random.split(jax.random.key(0), 3))
-    with pytest.raises(InputError, match=r"0 is no key; expected jax.random.key"):
-        env.reset(0)
+    for number in (0, np.int32(0)):
+        with pytest.raises(InputError, match=r"is no key; expected jax.random.key"):
+            env.reset(number)
     with pytest.raises(InputError, match=r"have shape \(2, 3\); expected \(2, "):
         env.step(env.reset(raw), jnp.zeros((2, 3)))
     assert env.unwrapped is env
+    begun = env.reset(raw)
+    assert begun.replace(reward=begun.done + 2).reward.tolist() == [2, 2]

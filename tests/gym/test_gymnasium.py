@@ -272,7 +272,7 @@ def test_other_wrong_input_is_one_line(env, monkeypatch):
     for options in ({"objects": 5}, {"randomisation": None}):
         with pytest.raises(InputError, match=f"{next(iter(options))}"):
             gymnasium.make(ID, **options)
-    for action in (np.zeros(7), np.full(8, np.nan)):
+    for action in (np.zeros(7), np.full(8, np.nan), None, np.full(8, 1j)):
         with pytest.raises(InputError, match="8 finite numbers"):
             env.step(action)
     monkeypatch.delenv("DISPLAY", raising=False)

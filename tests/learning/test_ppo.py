@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from manipose_mj.errors import InputError
 from manipose_mj.learning.network import Normaliser
 from manipose_mj.learning.ppo import Ppo, PpoConfig, _Step
 
@@ -116,3 +117,10 @@ def test_the_normaliser_knows_mean_and_variance_of_all_it_saw():
     both = np.concatenate([part.reshape(-1, 2) for part in parts])
     np.testing.assert_allclose(normaliser.mean, both.mean(axis=0), atol=0.02)
     np.testing.assert_allclose(normaliser.variance, both.var(axis=0), rtol=0.02)
+
+
+def test_fewer_actions_than_minibatches_are_refused():
+    few = Line()
+    few.count = 1
+    with pytest.raises(InputError, match="1 worlds are too few for 4 minibatches of 2 actions"):
+        Ppo(few, lambda seen: seen["place"], lambda _, action: action, 1, PpoConfig(steps=2))

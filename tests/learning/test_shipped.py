@@ -38,12 +38,12 @@ def test_they_are_small_and_say_what_they_are():
 @pytest.mark.parametrize(
     ("name", "pieces", "least"),
     [
-        ("open_middle_drawer", (4, 14, 19, 24), 44),  # in single environments 97 %
-        ("open_cabinet_door", (4, 9, 14, 34, 39), 44),  # 94 %
+        ("open_middle_drawer", (4, 14, 19, 24), 21),  # in single environments 97 %
+        ("open_cabinet_door", (4, 9, 14, 34, 39), 21),  # 94 %
     ],
 )
 def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, name, pieces, least):
-    """Fifty episodes of the protocol: so many that rounding on another processor does not decide."""
+    """So many episodes of the protocol that rounding on another processor does not decide."""
     settings = PolicySettings(
         "manipose_mj.learning:TrainedPolicy",
         json.dumps({"path": name}),
@@ -51,12 +51,12 @@ def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, nam
         control_mode="pd_ee_pose",
         hz=5.0,
     )
-    batch = BatchSettings("c", 50)
+    batch = BatchSettings("c", 25)
     config = EvaluationConfig(
-        (f"articulated/{name}",), tmp_path, episodes=50, protocol="v1", policy=settings, batch=batch
+        (f"articulated/{name}",), tmp_path, episodes=25, protocol="v1", policy=settings, batch=batch
     )
     results = evaluate(config)
-    assert len(results) == 50
+    assert len(results) == 25
     assert {result.object for result in results} == {f"cabinet_{i:03}" for i in pieces}
     assert sum(result.success_at_end for result in results) >= least
 
@@ -70,7 +70,7 @@ def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
         *(sys.executable, "-m", "manipose_mj.cli.main", "evaluate", "example/lift"),
         *("--policy", "manipose_mj.learning:TrainedPolicy", "--policy-args", '{"path": "lift"}'),
         *("--obs-mode", "state+pose", "--control-mode", "pd_ee_pose", "--hz", "5"),
-        *("--episodes", "96", "--seed", "100", "--engine", "c", "--worlds", "96"),
+        *("--episodes", "48", "--seed", "100", "--engine", "c", "--worlds", "48"),
         *("--out", str(tmp_path), "--objects", *objects),
     )
     done = subprocess.run(
@@ -78,6 +78,6 @@ def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
     )
     assert done.returncode == 0, done.stderr
     results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
-    assert len(results) == 96
+    assert len(results) == 48
     # In single environments 90 %.
-    assert sum(result["success_at_end"] for result in results) >= 76
+    assert sum(result["success_at_end"] for result in results) >= 37

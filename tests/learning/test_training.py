@@ -31,6 +31,9 @@ def test_starts_are_kept_in_a_file_with_shorter_episodes(tmp_path):
     other = TrainingConfig("articulated/close_middle_drawer", starts=2, objects=PIECES)
     with pytest.raises(InputError, match="of another task or mode"):
         training_pool(other, tmp_path / "starts")
+    brief = TrainingConfig(TASK, starts=2, objects=PIECES, episode=0.1)
+    with pytest.raises(InputError, match=r"episode is 0.1 s; .* 0.2 s"):
+        training_pool(brief, tmp_path / "starts")
 
 
 def test_tasks_with_an_object_and_a_handle_are_refused():
@@ -109,8 +112,9 @@ def test_a_training_leaves_a_policy_that_evaluate_plays(tmp_path, capsys):
     ]
     out, results = tmp_path / "ppo", tmp_path / "results"
     assert main([*words, "--objects", *PIECES, "--out", str(out)]) == 0
-    rows = json.loads((out / "curve.json").read_text())["rows"]
-    assert rows[-1]["actions"] == 4 * 16
+    curve = json.loads((out / "curve.json").read_text())
+    assert curve["rows"][-1]["actions"] == 4 * 16
+    assert curve["starts"]["seeds"] == [0, 1] and {*curve["starts"]["objects"]} <= {*PIECES}
     on = ["--policy", str(out / POLICY_FILE), "--out", str(tmp_path / "on")]
     assert main([*words, "--objects", *PIECES, *on]) == 0
     actor, before = (

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from manipose_mj.batch.row_models import RowModels
-from manipose_mj.batch.worlds import State, Worlds
+from manipose_mj.batch.state import State
+from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.ray_camera import camera_intrinsics
 from manipose_mj.poses import Array, compose

@@ -32,6 +32,7 @@ from manipose_mj.tasks.scene.reader import SceneReader
 from manipose_mj.tasks.scene.state import SceneState
 
 CONTROL_TIMESTEP = 0.02
+SUCCESS_HELD = 0.5  # for how long a goal must hold until an evaluation may end an episode [s]
 
 
 class ManipulationTask(composer.Task):

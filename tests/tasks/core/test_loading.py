@@ -82,6 +82,8 @@ def test_the_time_limit_ends_the_episode():
     environment.reset()
     ended = [environment.step(HOLD).last() for _ in range(5)]
     assert ended == [False] * 4 + [True]
+    with pytest.raises(InputError, match="unknown argument of an environment 'time_limits'; did"):
+        load(*STORE, seed=0, environment_kwargs={"time_limits": 0.1})
 
 
 def test_dm_control_knows_the_tasks_once_registered(monkeypatch):
