@@ -143,9 +143,7 @@ def task_folder(out: Path, task: str) -> Path:
 
 def current_versions() -> dict[str, str]:
     """Of the packages that can change a replay."""
-    found = versions()
-    del found["platform"]
-    return found
+    return {n: v for n, v in versions().items() if n not in ("platform", "source")}
 
 
 def current_protocol() -> dict[str, str]:

@@ -15,8 +15,12 @@ from typing import Any
 
 from manipose_mj.evaluation.records import EpisodeResult
 from manipose_mj.failures import STAGES
+from manipose_mj.storage.source_hash import distribution_hash
 
-VERSIONED = ("mujoco", "dm_control", "mink", "numpy", "manipose_mj")
+_VERSIONED = (
+    *("mujoco", "dm_control", "mink", "daqp", "jax", "numpy", "scipy"),
+    *("trimesh", "manifold3d", "coacd", "manipose_mj"),
+)
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -82,13 +86,14 @@ def summarize(results: Iterable[EpisodeResult]) -> dict[str, dict[str, Any]]:
 
 
 def versions() -> dict[str, str]:
-    """Of Python, the platform and the packages that can change a result."""
+    """Of Python, the platform and the packages that can change a result; `source` is the hash of our own code."""
     found = {"python": platform.python_version()}
-    for name in VERSIONED:
+    for name in _VERSIONED:
         try:
             found[name] = importlib.metadata.version(name.replace("_", "-"))
         except importlib.metadata.PackageNotFoundError:
             found[name] = "not installed"
+    found["source"] = distribution_hash()
     found["platform"] = platform.platform()
     return found
 

@@ -1,4 +1,4 @@
-"""A hash of modules' own source and of every module of ours that they import, directly or not."""
+"""Hashes of our own source: of modules with every module that they import, directly or not, or of all there is."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = ("asset_pipeline", "manipose_mj")
+_SHIPPED = (".py", ".json", ".npz")
 
 
 def source_hash(modules: Iterable[str], *extra: str) -> str:
@@ -22,6 +23,18 @@ def source_hash(modules: Iterable[str], *extra: str) -> str:
     digest = hashlib.sha256("\n".join(extra).encode())
     for path in sorted(sources(modules)):
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+@cache
+def distribution_hash() -> str:
+    """Twelve hexadecimal digits that change when any code, weights or other data of both packages do."""
+    digest = hashlib.sha256()
+    for package in _PACKAGES:
+        for path in sorted(_ROOT.joinpath(package).rglob("*")):
+            if path.suffix in _SHIPPED:
+                digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0")
+                digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 

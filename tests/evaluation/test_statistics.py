@@ -6,6 +6,7 @@ import pytest
 
 from manipose_mj.evaluation.records import EpisodeResult
 from manipose_mj.evaluation.statistics import summarize, versions, wilson_interval
+from manipose_mj.storage import source_hash
 
 
 def result(task: str, episode: int, failure: str | None, **changes) -> EpisodeResult:
@@ -63,4 +64,21 @@ def test_a_result_cannot_contradict_itself() -> None:
 
 
 def test_versions_name_what_can_change_a_result() -> None:
-    assert {"python", "mujoco", "dm_control", "mink", "numpy", "platform"} <= versions().keys()
+    named = {"python", "mujoco", "dm_control", "mink", "jax", "numpy", "trimesh", "platform"}
+    assert named <= versions().keys() and "not installed" not in versions().values()
+
+
+def test_the_source_has_a_hash_of_all_that_ships(tmp_path, monkeypatch):
+    monkeypatch.setattr(source_hash, "_ROOT", tmp_path)
+    for name in ("manipose_mj/a.py", "asset_pipeline/b.json", "manipose_mj/weights/c.npz"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("1")
+    whole = source_hash.distribution_hash.__wrapped__
+    hashes = [whole()]
+    for path in sorted(tmp_path.rglob("*.*")):
+        path.write_text("2")
+        hashes.append(whole())
+    (tmp_path / "manipose_mj" / "__pycache__.pyc").write_text("3")
+    assert len(set(hashes)) == 4 and whole() == hashes[-1]
+    assert len(versions()["source"]) == 12
