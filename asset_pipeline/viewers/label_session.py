@@ -93,17 +93,15 @@ class LabelSession:
 
     def turn(self, axis: int, degrees: float) -> None:
         """Turn the label about its own X, Y or Z (0, 1, 2)."""
-        self.label = moved(self.label, FrameOverride(turn=np.deg2rad(degrees) * np.eye(3)[axis]))
+        self._move(FrameOverride(turn=np.deg2rad(degrees) * np.eye(3)[axis]))
 
     def shift(self, axis: int, metres: float) -> None:
         """Shift the label along its own X, Y or Z (0, 1, 2)."""
-        self.label = moved(self.label, FrameOverride(shift=metres * np.eye(3)[axis]))
+        self._move(FrameOverride(shift=metres * np.eye(3)[axis]))
 
     def place(self, pose: Float[np.ndarray, "4 4"]) -> None:
         """Put the label's frame at `T_mesh_label`."""
-        self.label = moved(
-            self.label, FrameOverride(origin=pose[:3, 3].copy(), rotation=pose[:3, :3].copy())
-        )
+        self._move(FrameOverride(origin=pose[:3, 3].copy(), rotation=pose[:3, :3].copy()))
 
     def set_symmetry(self, name: str) -> None:
         """Say what group the shape has: a key of `SYMMETRIES`."""
@@ -145,6 +143,12 @@ class LabelSession:
             put_entry(self.labels, self.asset.name, {})
         self.asset = relabelled(self.asset, None)
         self.select(OBJECT)
+
+    def _move(self, frame: FrameOverride) -> None:
+        """Symmetry goes with the axes: the person sees it beside them, and it is saved with them."""
+        symmetry, printed = self.label.symmetry, self.label.print_symmetry
+        after = moved(self.label, replace(frame, symmetry=symmetry))
+        self.label = replace(after, print_symmetry=printed)
 
     def _label_of(self, asset: Asset) -> PoseLabel:
         if self.target == OBJECT:

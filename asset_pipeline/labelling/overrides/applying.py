@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
+from asset_pipeline.labelling.overrides.other_axes import symmetries_along
 from asset_pipeline.labelling.overrides.reading import FrameOverride, Override, PartOverride
 from asset_pipeline.labelling.scan_label import scan_label
 from manipose_mj.assets.asset import Area, Asset, MovingPart
@@ -39,7 +40,8 @@ def overridden(
       textured: Whether it has a texture.
 
     Raises:
-      InputError: The object has no such part, handle or mass of its own; or it cannot be measured.
+      InputError: The object has no such part, handle or mass of its own; it cannot be measured; or its
+        symmetry has to be said with its axes.
     """
     if asset.kind == "articulated":
         for key in ("object_type", "functional", "mass", "up"):
@@ -61,7 +63,7 @@ def overridden(
         )
     up = asset.up if override.up is None else override.up
     found, quality = _measured(asset, override, surface, category, up, textured)
-    label = moved(found, override.frame)
+    label = _moved(found, override.frame, override.where)
     _check_units(override, label, surface)
     if label is not found:
         quality = None  # a person's word
@@ -104,7 +106,11 @@ def _check_units(override: Override, label: PoseLabel, surface: trimesh.Trimesh)
 
 
 def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
-    """The label with another frame or symmetry; its extents are those of the old box in the new axes."""
+    """The label with another frame or symmetry; its extents are those of the old box in the new axes.
+
+    Raises:
+      InputError: Its symmetry is not said, and cannot be that of the label; see `symmetries_along`.
+    """
     if not frame_says_something(frame):
         return label
     origin = label.origin if frame.origin is None else frame.origin
@@ -112,6 +118,10 @@ def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
     origin = origin + rotation @ frame.shift
     for axis, angle in zip(np.eye(3), frame.turn, strict=True):
         rotation = rotation @ rotation_about(axis, angle)
+    if frame.symmetry is None:
+        symmetry, printed = symmetries_along(label, rotation)
+    else:
+        symmetry, printed = frame.symmetry, None
     return replace(
         label,
         origin=origin,
@@ -119,9 +129,17 @@ def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
         extents=_box_along(rotation.T @ label.rotation, label.extents)
         if frame.extents is None
         else frame.extents,
-        symmetry=label.symmetry if frame.symmetry is None else frame.symmetry,
-        print_symmetry=label.print_symmetry if frame.symmetry is None else None,
+        symmetry=symmetry,
+        print_symmetry=printed,
     )
+
+
+def _moved(label: PoseLabel, frame: FrameOverride, where: str) -> PoseLabel:
+    """The same, with `where` before what is wrong."""
+    try:
+        return moved(label, frame)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def frame_says_something(frame: FrameOverride) -> bool:
@@ -171,7 +189,8 @@ def _part(override: Override, part: MovingPart) -> MovingPart:
         return part
     handle, joint = part.handle, part.joint
     if said.handle is not None:
-        handle = moved(handle or _new_handle(override, part.name, said.handle), said.handle)
+        found = handle or _new_handle(override, part.name, said.handle)
+        handle = _moved(found, said.handle, f"{override.where}: parts: {part.name}: handle")
     if said.joint_origin is not None:
         joint = replace(joint, origin=said.joint_origin)
     if said.joint_axis is not None:

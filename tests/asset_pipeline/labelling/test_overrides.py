@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -15,6 +16,7 @@ import tests.asset_pipeline.scan_files as files
 from asset_pipeline.build.data_set import build
 from asset_pipeline.build.relabel import MEASURED_FILE, OVERRIDE, measured, relabel
 from asset_pipeline.labelling.overrides.applying import moved, overridden
+from asset_pipeline.labelling.overrides.fields import rotation_of
 from asset_pipeline.labelling.overrides.reading import FrameOverride, parsed, read_overrides
 from asset_pipeline.labelling.overrides.writing import put_entry
 from manipose_mj.assets.asset import GRASPS_FILE
@@ -145,6 +147,47 @@ def test_an_adjustment_is_about_the_labels_own_axes_and_comes_last():
     np.testing.assert_allclose(after.rotation[:, 1], label.rotation[:, 1])
     assert rotation_angle(after.rotation, label.rotation) == pytest.approx(0.3)
     assert moved(label, FrameOverride()) is label
+
+
+@pytest.mark.parametrize("turn", [[0, 90, 0], [0, 0, -90], [90, 90, 0], [0, 40, 30]])
+def test_other_axes_leave_the_rotations_of_the_object_as_they_are(turn):
+    printed = SYMMETRIES["half turn"]
+    label = replace(made.label(symmetry=SYMMETRIES["quarter turns"]), print_symmetry=printed)
+    after = moved(label, FrameOverride(turn=np.deg2rad(turn)))
+    for own, before in (
+        (after.symmetry, label.symmetry),
+        (after.symmetry_textured, label.symmetry_textured),
+    ):
+        turns = after.rotation @ own.rotations @ after.rotation.T
+        kept = label.rotation @ before.rotations @ label.rotation.T
+        np.testing.assert_allclose(turns, kept, atol=1e-12)
+
+
+def test_symmetry_goes_with_axes_that_are_corrected():
+    label = made.label()
+    after = moved(label, FrameOverride(turn=np.deg2rad([2.0, 5.0, -10.0])))
+    assert symmetry_name(after.symmetry) == "half turn"
+    # Y where X was, as well as a hand can write it.
+    x, y = -label.rotation[:, 1], label.rotation[:, 0] + [0, 0.02, 0]
+    after = moved(label, FrameOverride(rotation=rotation_of("", {"x": [*x], "y": [*y]})))
+    assert symmetry_name(after.symmetry) == "half turn about y"
+
+
+def test_an_axis_of_revolution_stays_x_unless_a_symmetry_is_said(tmp_path):
+    asset = made.block(tmp_path / "block")
+    asset = replace(asset, label=made.label("axial", SYMMETRIES["axis and flip"]))
+    mesh = surface(visible_shapes(asset.folder))
+
+    def told(**fields):
+        return overridden(asset, _entry(**fields), mesh, textured=False).label.symmetry
+
+    for turn in ([0, 0, 2.5], [130, 0, 0], [0, 180, 0], [40, 178, 0]):
+        assert symmetry_name(told(adjust={"turn": turn})) == "axis and flip"
+    axes = {"x": [1, 0, 0], "y": [0, 0, 1]}
+    with pytest.raises(InputError, match="block: x: is 90 deg from .*; give 'symmetry' too") as no:
+        told(**axes)
+    assert "\n" not in str(no.value)
+    assert symmetry_name(told(**axes, symmetry="half turn")) == "half turn"
 
 
 def test_symmetry_names_are_of_closed_groups_and_told_apart():

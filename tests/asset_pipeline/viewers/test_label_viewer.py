@@ -75,6 +75,14 @@ def test_a_saved_adjustment_is_in_the_file_and_in_the_asset(session, assets):
     assert yaml.safe_load(session.labels.read_text()) is None
 
 
+def test_symmetry_goes_with_the_axes_that_a_person_sees(session, assets):
+    session.set_symmetry("axis")
+    session.turn(1, 90.0)
+    session.save()
+    assert symmetry_name(read_asset(assets / "unsure").label.symmetry) == "axis"
+    assert yaml.safe_load(session.labels.read_text())["unsure"]["symmetry"] == "axis"
+
+
 def test_saving_keeps_what_else_the_file_says(session, assets):
     session.labels.write_text(
         "unsure:\n  mass: 2.0\n  adjust: {turn: [0, 0, 5]}\n# ours\nother: {mass: 1}\n"
