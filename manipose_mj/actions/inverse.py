@@ -114,7 +114,7 @@ def _(law: JointDeltaVelocity, memory, arm, joints, timestep) -> Float[np.ndarra
 @arm_action.register
 def _(law: JointVelocity, memory, arm, joints, timestep) -> Float[np.ndarray, "7"]:
     # At the end of the step the servos are sent the target and the velocity's lead on it.
-    return (joints - memory.joints) / (timestep + arm.servo_lag)
+    return (joints - law.departure(memory, arm)) / (timestep + arm.servo_lag)
 
 
 @arm_action.register

@@ -64,9 +64,13 @@ class JointVelocity(JointPositionVelocity):
 
     def command(self, memory: Memory, action: Float[Array, "*b 7"], arm: Arm) -> Memory:
         """Where the targets are before they move on."""
-        xp = namespace(action)
-        joints = xp.clip(memory.joints, arm.joints - _MAX_LEAD, arm.joints + _MAX_LEAD)
+        joints = self.departure(memory, arm)
         return memory._replace(joints=joints, velocity=action, lead=arm.servo_lag * action)
+
+    def departure(self, memory: Memory, arm: Arm) -> Float[Array, "*b 7"]:
+        """The targets [rad] that the next step starts from: those before, no farther ahead than they wait."""
+        xp = namespace(memory.joints)
+        return xp.clip(memory.joints, arm.joints - _MAX_LEAD, arm.joints + _MAX_LEAD)
 
     def targets(self, memory: Memory, timestep: float) -> tuple[Float[Array, "*b 7"], Memory]:
         """Moved on by one physics step."""

@@ -135,6 +135,20 @@ def test_the_same_targets_make_the_same_motion_in_every_mode(arm, name):
         np.testing.assert_allclose(own, reference, atol=1e-9)
 
 
+@pytest.mark.parametrize("ahead", [0.09, 0.15])
+def test_a_velocity_arrives_only_where_the_servos_are_sent_there(arm, ahead):
+    name = "pd_joint_vel"
+    arm.start(name)
+    for _ in range(10):
+        arm.step(act(name, 1.0))
+        arm.robot.set_configuration(arm.physics, HOME, MAX_OPENING)  # something holds it
+    goal = HOME + ahead * np.eye(7)[0]
+    action, arrives = action_towards(arm.mode, arm.physics, arm.robot, goal, 0.03, TIMESTEP)
+    arm.step(action)
+    assert arrives == (ahead < 0.1)
+    assert arrives == np.allclose(arm.controls, goal, atol=1e-6)
+
+
 def _straight_goals() -> np.ndarray:
     """Joint targets that move the TCP to the side without turning it."""
     solver, joints, goals = TcpSolver(), HOME, []
