@@ -12,7 +12,7 @@ from jaxtyping import Float
 from asset_pipeline.build.drawn_handle import with_handle
 from asset_pipeline.build.emit import write_asset
 from asset_pipeline.build.link_shapes import HANDLE, link_shapes
-from asset_pipeline.build.link_visuals import link_visuals
+from asset_pipeline.build.link_visuals import Textures, link_visuals
 from asset_pipeline.geometry.mass import shape_mass_properties
 from asset_pipeline.labelling.articulated_label import articulated_label
 from asset_pipeline.labelling.cavities import cavity_behind
@@ -71,8 +71,8 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
     flat = {name: [s for group in own.values() for s in group] for name, own in shapes.items()}
     boxes = {name: _bounds(own) for name, own in flat.items()}
     parts = []
-    with tempfile.TemporaryDirectory(prefix="manipose-texture-") as textures:
-        bodies = []
+    with tempfile.TemporaryDirectory(prefix="manipose-texture-") as scratch:
+        bodies, textures = [], Textures(Path(scratch))
         for link in links:
             mass = _mass(link, shapes[link.name], scan.appliance)
             joint, balanced = _joint(link, mass)
@@ -80,7 +80,7 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
                 Body(
                     name=link.name,
                     collision=tuple(flat[link.name]),
-                    visual=link_visuals(link.parts, Path(textures)),
+                    visual=link_visuals(link.parts, textures),
                     mass_properties=mass,
                     joint=joint,
                     excluded=_excluded(link, scan, boxes),

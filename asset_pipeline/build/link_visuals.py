@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +20,38 @@ MAX_FACES = 8000  # of one mesh; only untextured meshes are made coarser ...
 MAX_CELL = 0.004  # ... and no point of them moves much farther than this [m]
 
 
-def link_visuals(parts: Sequence[PartMesh], textures: Path) -> tuple[Shape, ...]:
+@dataclass(frozen=True)
+class Textures:
+    """Textures of an object as PNG in one folder, those of one name from different places side by side.
+
+    Attributes:
+      folder: Must outlast the shapes.
+      written: Files there by the images that they are of.
+    """
+
+    folder: Path
+    written: dict[Path, Path] = field(default_factory=dict)
+
+    def png(self, image: Path) -> Path:
+        """The file of an image, written once.
+
+        Raises:
+          InputError: The image is missing or none.
+        """
+        if image not in self.written:
+            target, numbers = self.folder / f"{image.stem}.png", count(2)
+            while target.exists():
+                target = self.folder / f"{image.stem}-{next(numbers)}.png"
+            self.written[image] = write_texture(image, target)
+        return self.written[image]
+
+
+def link_visuals(parts: Sequence[PartMesh], textures: Textures) -> tuple[Shape, ...]:
     """Visual shapes: the surfaces of all parts, joined where colour or texture is the same.
 
     Args:
       parts: Of one link.
-      textures: Folder for the textures as PNG; must outlast the shapes.
+      textures: Of the whole object.
     """
     groups: dict[tuple[Path | None, tuple[float, ...]], list[Surface]] = {}
     for surface in (s for part in parts for s in part.surfaces):
@@ -36,7 +64,7 @@ def link_visuals(parts: Sequence[PartMesh], textures: Path) -> tuple[Shape, ...]
             continue
         image = None
         if texture is not None:
-            image = write_texture(texture, textures / f"{texture.stem}.png")
+            image = textures.png(texture)
         elif len(mesh.faces) > MAX_FACES:
             mesh = coarser(mesh, MAX_FACES, MAX_CELL)
         shapes.append(Shape("mesh", mesh=mesh, rgba=surfaces[0].rgba, texture=image))

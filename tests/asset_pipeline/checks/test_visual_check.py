@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from asset_pipeline.build.emit import model_element
-from asset_pipeline.build.link_visuals import MAX_CELL, link_visuals
+from asset_pipeline.build.link_visuals import MAX_CELL, Textures, link_visuals
 from asset_pipeline.checks.visual_check import visual_failures
 from asset_pipeline.geometry.mass import shape_mass_properties
 from asset_pipeline.geometry.vertex_clustering import coarser
@@ -91,11 +91,11 @@ def test_many_faces_become_few_and_no_wall_is_lost(tmp_path):
     assert coarser(drawn, 20480, 0.1) is drawn
 
 
-def test_no_budget_of_faces_moves_a_point_by_more_than_a_cell():
+def test_no_budget_of_faces_moves_a_point_by_more_than_a_cell(tmp_path):
     rng = np.random.default_rng(0)
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
     ball.vertices += rng.normal(scale=1e-4, size=ball.vertices.shape)
     part = PartMesh("ball", "ball-0", (Surface(ball, (0.5, 0.5, 0.5, 1.0)),))
-    (shape,) = link_visuals([part], None)
+    (shape,) = link_visuals([part], Textures(tmp_path))
     gaps = np.abs(np.linalg.norm(np.asarray(shape.mesh.triangles_center), axis=1) - 0.1)
     assert len(shape.mesh.faces) < len(ball.faces) and gaps.max() < MAX_CELL
