@@ -51,10 +51,10 @@ def robustness(
       seed: Of the draws.
       friction: Factor by which friction differs at most, up or down; that of the finger pads stays.
       mass: The same for objects' masses.
-      gains: The same for the stiffness of the arm's servos.
+      gains: The same for the stiffness of each servo, the gripper's too.
       latency_ms: Most by which set-points come late.
-      shift_cm: Most by which objects and furniture stand beside where the plan has them.
-      turn_deg: Most by which they are turned.
+      shift_cm: Most by which objects and furniture stand, as one, beside where the plan has them.
+      turn_deg: Most by which they are turned about the first object; this carries what stands beside it farther than shift_cm.
       objects: What plans recorded now draw from: names of built-in objects, asset folders, or folders of them.
       jobs: Processes.
     """

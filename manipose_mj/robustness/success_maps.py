@@ -22,8 +22,8 @@ _LABELS = {
     "mass": "mass, factor",
     "gains": "servo stiffness, factor",
     "latency_ms": "latency [ms]",
-    "shift_cm": "beside its place [cm]",
-    "turn_deg": "turned by [deg]",
+    "shift_cm": "all shifted by [cm]",
+    "turn_deg": "turned about the first object [deg]",
 }
 
 

@@ -27,9 +27,11 @@ class Variation:
     Attributes:
       friction, mass, gains: Factors are log-uniform between 1 / f and f; see `Randomisation`.
       latency_ms: Most by which servo targets come late, uniform from none.
-      shift_cm: Most by which an object or a piece of furniture stands beside where the plan has it; in any
+      shift_cm: Most by which all objects and furniture stand, as one, beside where the plan has them; in any
         direction on the table, the distance uniform.
-      turn_deg: Most by which it is turned about the vertical, uniform both ways.
+      turn_deg: Most by which they are turned as one, uniform both ways, about the vertical through the first
+        object, or through the first piece of furniture where there is no object. What stands at a distance d from
+        there goes d times the turn besides: 5 cm at 0.6 m and 5 deg, whatever `shift_cm` is.
     """
 
     friction: float = 1.5
@@ -82,7 +84,7 @@ class Varied:
     def draw(
         self, start: EpisodeStart, rng: np.random.RandomState, *, nominal: bool = False
     ) -> tuple[EpisodeStart, dict[str, float]]:
-        """Another world for the same plan, and what was drawn.
+        """Another world for the same plan, and what was drawn; `shift_cm` is of what the rest is turned about.
 
         Args:
           start: As the plan was made for.
@@ -124,7 +126,7 @@ def _nothing() -> dict[str, float]:
 
 
 def _moved(start: EpisodeStart, shift: Float[np.ndarray, "3"], turn: float) -> EpisodeStart:
-    """The objects on the table, or the furniture and what lies in it, beside where they were."""
+    """Objects and furniture beside where they were: all turned about `_centre`, then shifted."""
     about = rotation_about(np.array([0.0, 0.0, 1.0]), turn)
     centre = _centre(start)
 
@@ -150,7 +152,7 @@ def _moved(start: EpisodeStart, shift: Float[np.ndarray, "3"], turn: float) -> E
 
 
 def _centre(start: EpisodeStart) -> Float[np.ndarray, "3"]:
-    """What the world is turned about: the first object, or the furniture where there is none."""
+    """What all else is turned about: the first object, or the first piece of furniture where there is none."""
     for placed in start.objects.values():
         return placed.pose[:3, 3].copy()
     return np.asarray(start.furniture[0].position, float)
