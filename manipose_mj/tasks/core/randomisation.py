@@ -42,7 +42,8 @@ class Randomisation:
     Attributes:
       friction: Factor of the sliding friction of everything but the finger pads; one for all.
       mass: Factor of each object's mass and inertia.
-      gains: Factor of the arm's servo stiffness; damping follows with its root, so that none rings.
+      gains: Factor of each servo's stiffness, the gripper's too, one for each; the damping of the arm's follows with
+        its root, so that none rings.
       light: Factor of each light's brightness.
       light_shift: Standard deviation of each light's place, each way [m].
       colour: Standard deviation of every colour's channels, of 1.

@@ -43,7 +43,10 @@ def reward(
 
 
 def progress(goals: Sequence[Goal], state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
-    """Progress towards all goals, in [0, 1]; 1 where all are met.
+    """Progress towards all goals, in [0, 1].
+
+    Where all are met it may still be less than 1, and `reward` is 1 all the same: an object that counts as at rest
+    moves a little, a drawer that counts as shut stands open a little.
 
     Neighbours of one kind count side by side, in any order; different kinds one after the other, the
     next from where the one before is all but met: a drawer that must be shut in the end gains nothing
