@@ -75,6 +75,7 @@ class Candidates:
         if not self._groups:
             raise InputError("there are no objects to draw from")
         refusal: InputError | None = None
+        refused: set[str] = set()  # in this draw: what others found out shall not end it sooner
         for _ in range(_DRAWS):
             group = self._groups[rng.randint(len(self._groups))]
             candidate = group[rng.randint(len(group))]
@@ -84,7 +85,8 @@ class Candidates:
                 return self._usable(candidate)
             except InputError as error:
                 refusal = error
-                if all(self._refusals.get(name) for name in self._by_name):
+                refused.add(candidate.name)
+                if len(refused) == len(self._by_name):
                     break
         said = refusal or f"there are no objects besides {', '.join(without)}"
         raise InputError(str(said)) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +17,15 @@ _MARKERS = "goal", "goal_object"
 _ORTHONORMAL = 1e-4
 
 
-def with_goal(start: EpisodeStart, pose: Float[np.ndarray, "4 4"]) -> EpisodeStart:
+def with_goal(
+    start: EpisodeStart, pose: Float[np.ndarray, "4 4"], of: Collection[str] = ()
+) -> EpisodeStart:
     """The start with another goal pose of the object that the episode is about, and its marker there.
 
     Args:
       start: As it was drawn.
       pose: `T_world_label`; of it, a goal that is an orientation takes the rotation.
+      of: Names of objects, one of which the goal shall be of, as goals use them; by default the first with a pose.
 
     Raises:
       InputError: The task asks for no pose, or this is none.
@@ -29,6 +33,8 @@ def with_goal(start: EpisodeStart, pose: Float[np.ndarray, "4 4"]) -> EpisodeSta
     check_pose(pose)
     goals, marked = list(start.goals), pose
     for index, goal in enumerate(goals):
+        if of and getattr(goal, "object", None) not in of:
+            continue
         if isinstance(goal, PoseGoal):
             goals[index] = replace(goal, pose=pose)
             break

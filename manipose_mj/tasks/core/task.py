@@ -200,7 +200,12 @@ class ManipulationTask(composer.Task):
         self._preview.change(changes)
         start = self.sample(rng, spec, self._preview)
         if spec.goal is not None:
-            start = with_goal(start, np.array(spec.goal))
+            asked = [
+                name
+                for name, placed in start.objects.items()
+                if self.scene.rigid_objects[placed.index].asset.name == spec.object
+            ]
+            start = with_goal(start, np.array(spec.goal), asked)
         # The seed is drawn whatever the sensors: the next episode shall not depend on what is observed.
         return replace(start, model=changes, noise_seed=int(rng.randint(2**31)))
 

@@ -32,15 +32,16 @@ def part_words(asset: Asset, part: MovingPart) -> str:
 
 def part_words_among(parts: Sequence[MovingPart], part: MovingPart) -> str:
     """The same among any parts, wherever they are known from."""
-    kind = kind_of(part)
-    alike = [p for p in parts if p.handle is not None and kind_of(p) == kind]
+    drawer = kind_of(part) == "drawer"
+    # Flaps are called doors too.
+    alike = [p for p in parts if p.handle is not None and (kind_of(p) == "drawer") is drawer]
     rows = rows_of(alike)
     row = next(i for i, parts in enumerate(rows) if any(p.name == part.name for p in parts))
     beside = sorted(rows[row], key=_from_left)
     column = [p.name for p in beside].index(part.name)
     level, counted_up = _among(row, len(rows), ("bottom", "middle", "top"))
     side, counted_right = _among(column, len(beside), ("left", "middle", "right"))
-    words = [level, side, "drawer" if kind == "drawer" else "door", counted_up, counted_right]
+    words = [level, side, "drawer" if drawer else "door", counted_up, counted_right]
     return " ".join(word for word in words if word)
 
 
@@ -85,6 +86,11 @@ def direction_words(direction: Float[np.ndarray, "3"]) -> str:
     return f"{abs(angle)} degrees to the {'left' if angle > 0 else 'right'}"
 
 
+def _has_no_ends(rotations: Float[np.ndarray, "n 3 3"]) -> bool:
+    """Whether every axis can be turned about, as a box's can, so that no end of it tells top or front."""
+    return bool((np.diagonal(rotations, axis1=1, axis2=2).min(axis=0) < -_UPRIGHT).all())
+
+
 def attitude_words(asset: Asset, rotation: Float[np.ndarray, "3 3"]) -> str:
     """How an object lies or stands.
 
@@ -95,11 +101,10 @@ def attitude_words(asset: Asset, rotation: Float[np.ndarray, "3 3"]) -> str:
     label, x, y = asset.label, rotation[:, 0], rotation[:, 1]
     if label.object_type == "functional":
         return f"its tip pointing {direction_words(x)}"
-    if (
-        len(label.symmetry.rotations) > 3 and not label.symmetry.axial
-    ):  # a box, whose sides have two ends
-        x, y = (axis if axis[2] > -_UPRIGHT else -axis for axis in (x, y))
-        return f"its longest side pointing {direction_words(x)}, its second {direction_words(y)}"
+    if not label.symmetry.axial and _has_no_ends(label.symmetry.rotations):
+        longest, second, _ = rotation.T[np.argsort(-label.extents, kind="stable")]
+        longest, second = (a if a[2] > -_UPRIGHT else -a for a in (longest, second))
+        return f"its longest side pointing {direction_words(longest)}, its second {direction_words(second)}"
     if abs(x[2]) < _UPRIGHT:
         return f"lying, its top pointing {direction_words(x)}"
     stands = "upright" if x[2] > 0 else "upside down"

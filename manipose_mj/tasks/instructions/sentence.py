@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manipose_mj.assets.asset import Asset
+from manipose_mj.tasks.articulated.part_choice import kind_of
 from manipose_mj.tasks.core.registry import named_task
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import (
@@ -82,9 +83,11 @@ def _phrase(task: ManipulationTask, goal: Goal) -> str | None:
         case ShutGoal():
             return f"shut {_part(task, goal.part)}"
         case InsideGoal():
-            return f"put {_object(task, goal.object)} into {_part(task, goal.part)}"
+            into, _ = _cavity(task, goal.part)
+            return f"put {_object(task, goal.object)} {into}"
         case TakenOutGoal():
-            out = f"take {_object(task, goal.object)} out of {_part(task, goal.part)}"
+            _, out_of = _cavity(task, goal.part)
+            out = f"take {_object(task, goal.object)} {out_of}"
             return f"{out} and set it down on the table {level_words(np.asarray(goal.center))}"
     return None
 
@@ -105,6 +108,17 @@ def _part(task: ManipulationTask, name: str) -> str:
     asset = _owner(task, name)
     part = next(part for part in asset.parts if part.name == name)
     return f"the {part_words(asset, part)} of the {asset_words(asset)}"
+
+
+def _cavity(task: ManipulationTask, name: str) -> tuple[str, str]:
+    """Into and out of what a part shuts: drawers hold things themselves, what doors shut stays where it is."""
+    asset, part = _owner(task, name), _part(task, name)
+    words = part_words(asset, asset.part(name))
+    if kind_of(asset.part(name)) == "drawer":
+        return f"into {part}", f"out of {part}"
+    if words == "door":
+        return f"into the {asset_words(asset)}", f"out of the {asset_words(asset)}"
+    return f"behind {part}", f"from behind {part}"
 
 
 def _owner(task: ManipulationTask, part: str) -> Asset:

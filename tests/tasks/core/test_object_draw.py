@@ -12,10 +12,14 @@ from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError
+from manipose_mj.poses import compose
 from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.own_goal import with_goal
 from manipose_mj.tasks.core.registry import named_task
 from manipose_mj.tasks.core.scene_source import SceneSource
+from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.goals import PoseGoal
 from tests.few_objects import few, load
 
 TARGET_POSE = ("single_object", "target_pose")
@@ -66,6 +70,32 @@ def test_what_cannot_be_used_is_drawn_again_and_told_where_nothing_can():
         candidates.draw(rng, "mug_2")
     with pytest.raises(InputError, match="no mugs here"):
         Candidates(pool[:2], no_mugs).draw(rng)
+
+
+def test_what_was_refused_before_changes_no_draw():
+    assets = [catalogue.load_by_name(name) for name in (*MUGS, "box_000")]
+
+    def never(asset):
+        raise InputError(f"{asset.name}: never")
+
+    candidates = Candidates([Candidate(a.name, a.category, lambda a=a: a) for a in assets], never)
+    following = []
+    for _ in range(3):
+        rng = np.random.RandomState(4)
+        with pytest.raises(InputError, match="never"):
+            candidates.draw(rng)
+        following.append(rng.randint(2**31))
+    assert len(set(following)) == 1
+
+
+def test_a_goal_is_of_the_object_that_is_asked_for():
+    goals = (PoseGoal("a", np.eye(4)), PoseGoal("b", np.eye(4)))
+    lifted = compose(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    start = EpisodeStart(goals=goals, objects={})
+    for names, moved in (((), 0), (("b",), 1)):
+        found = with_goal(start, lifted, names).goals
+        heights = [float(np.asarray(goal.pose)[2, 3]) for goal in found]
+        assert heights[moved] == 0.3 and sum(heights) == 0.3
 
 
 def test_a_refusal_is_one_line_with_a_short_traceback_and_every_object_is_looked_at_once():

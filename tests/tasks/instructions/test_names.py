@@ -9,7 +9,9 @@ import pytest
 
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.asset import MovingPart
-from manipose_mj.poses import rotation_about
+from manipose_mj.poses import SymmetryGroup, rotation_about
+from manipose_mj.tasks.articulated.part_choice import kind_of
+from manipose_mj.tasks.instructions import sentence
 from manipose_mj.tasks.instructions.names import (
     attitude_words,
     direction_words,
@@ -17,6 +19,8 @@ from manipose_mj.tasks.instructions.names import (
     part_words,
     place_words,
 )
+from manipose_mj.tasks.instructions.sentence import instruction
+from tests.few_objects import load
 
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -95,3 +99,48 @@ def test_attitudes_are_told_by_the_label():
     assert attitude_words(box, np.eye(3)) == (
         "its longest side pointing straight ahead, its second 90 degrees to the left"
     )
+    flat = replace(
+        box.label, extents=box.label.extents[[2, 0, 1]]
+    )  # as a notebook's across its covers
+    assert attitude_words(replace(box, label=flat), np.eye(3)) == (
+        "its longest side pointing 90 degrees to the left, its second up"
+    )
+    quarters = [
+        rotation_about(np.array([1.0, 0.0, 0.0]), turn) for turn in np.arange(4) * np.pi / 2
+    ]
+    post = replace(box, label=replace(box.label, symmetry=SymmetryGroup(np.array(quarters))))
+    assert attitude_words(post, UPRIGHT).startswith("upright")
+    assert attitude_words(post, flipped).startswith("upside down")
+
+
+def test_a_flap_and_a_door_have_other_words():
+    oven, cabinet = (catalogue.load_by_name(name) for name in ("oven_007", "cabinet_003"))
+    flap = next(part for part in oven.parts if part.handle is not None)
+    door = next(part for part in cabinet.parts if kind_of(part) == "door")
+    lower, upper = _drawer(door, "door", 0.0, 0.3), _drawer(flap, "flap", 0.0, 0.7)
+    piece = replace(cabinet, parts=(lower, upper))
+    assert [part_words(piece, part) for part in piece.parts] == ["bottom door", "top door"]
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        ("store_microwave", "into the microwave, then shut the door of the microwave"),
+        ("take_out_cabinet_door", "out of the cabinet and set it down"),
+        ("store_middle_drawer", "into the middle drawer of the cabinet, then shut the middle"),
+    ],
+)
+def test_doors_hold_nothing_themselves(task, words):
+    environment = load("articulated", task, seed=1)
+    environment.reset()
+    assert words in instruction(environment.task)
+
+
+@pytest.mark.parametrize(
+    ("task", "words"), [("store", "behind the"), ("take_out", "from behind the")]
+)
+def test_of_several_doors_one_is_named(task, words, monkeypatch):
+    environment = load("articulated", f"{task}_cabinet_door", seed=1)
+    environment.reset()
+    monkeypatch.setattr(sentence, "part_words", lambda asset, part: "left door")
+    assert f" {words} left door of the cabinet" in instruction(environment.task)
