@@ -75,7 +75,9 @@ class PileScene:
         gap: float,
         speed: float,
     ) -> None:
-        """Let the next object fall from just above what lies there.
+        """Let the next object fall from just above what lies there, its label's origin taken for the middle of its box.
+
+        A tool, whose origin is elsewhere, may begin lower (`docs/experiments/pile_drops.md`).
 
         Args:
           order: Which; each once, from 0 on.
@@ -269,7 +271,7 @@ class PileScene:
         self._model.geom_conaffinity[:] = np.where(self._touching, conaffinity, 0)
 
     def _top(self) -> float:
-        """Height of the highest point of what has fallen [m]."""
+        """Height of the highest point of what has fallen, as in `drop` [m]."""
         tops = [0.0]
         for pose, asset in zip(self.poses()[: self._fallen], self._assets, strict=False):
             label = pose @ asset.label.pose

@@ -234,5 +234,5 @@ class Clutter(ManipulationTask):
 
 
 def _reach(asset: Asset) -> float:
-    """Radius of a circle about the label's origin that the object stays in, however it lies [m]."""
+    """Radius of a circle about the label's origin that the object stays in, however it lies, where that is its middle [m]."""
     return float(np.linalg.norm(np.sort(asset.label.extents)[1:])) / 2
