@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.control.furniture.fit.door_hinge import is_level, usual_swing
 from manipose_mj.control.furniture.fit.furniture_fit import fit_furniture
-from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
+from manipose_mj.control.furniture.joint_fit import fitted_joint, gone_along, opening_of, points_of
 from manipose_mj.control.furniture.named_parts import handle_of, named
 from manipose_mj.control.furniture.opened_part import reaching_unseen, seen_open, with_extra
 from manipose_mj.control.furniture.opening_search import Hidden, as_held, found_opening, misfit
@@ -233,7 +233,7 @@ class EstimatedFurniture:
             part = self._part(self._held.name)
             assert part is not None
             now = points_of((invert(model.pose) @ tcp_pose)[None], self._held.offset)[0]
-            opening = opening_of(part.part.joint, self._held.start, now)
+            opening = opening_of(part.part.joint, self._held.start, now, part.opening)
             self.model = model.with_part(part.at(opening))
             return
         suspected = [part for part in model.parts if self._may_have_moved(part, tcp_pose)]
@@ -262,16 +262,16 @@ class EstimatedFurniture:
           path: `T_world_tcp` of the hand that held its handle.
           stopped: Whether the part went no further.
         """
-        model, part = self.model, self._part(name)
-        if model is None or part is None or self._held is None:
+        model, part, held = self.model, self._part(name), self._held
+        if model is None or part is None or held is None:
             return
         own = invert(model.pose) @ path
-        held = self._held
-        started = opening_of(part.part.joint, held.start, points_of(own[:1], held.offset)[0])
+        began = points_of(own[:1], held.offset)[0]
+        started = opening_of(part.part.joint, held.start, began, part.opening)
         known = self._sure.get(name)
         fitted = fitted_joint(known or part.part.joint, own, sure=known is not None)
         joint, went = fitted.joint, points_of(own, fitted.offset)
-        gone = opening_of(joint, went[0], went[-1])
+        gone = gone_along(joint, went)
         opening = started + gone
         if joint.kind == "hinge" and abs(gone) > _LONG_ARC and not stopped:
             self._sure[name] = joint

@@ -26,6 +26,7 @@ _SURE_AXIS, _SURE_PLACE = np.radians(3.0), 0.008  # the same of what a long arc 
 _SHORT = 0.006  # ways that are shorter tell nothing [m]
 _CURVED = 3.0  # how many times better a hinge must fit for a drawer to be a door
 _LEAST_RADIUS = 0.05  # of hinges, from the handle [m]
+_QUARTER = np.pi / 2  # of a turn [rad]
 
 
 @dataclass(frozen=True)
@@ -164,11 +165,33 @@ def _across(axis: Float[np.ndarray, "3"]) -> tuple[np.ndarray, np.ndarray]:
     return first, np.cross(axis, first)
 
 
-def opening_of(joint: Joint, start: Float[np.ndarray, "3"], now: Float[np.ndarray, "3"]) -> float:
-    """By how much a joint has moved that took a point from `start` to `now` [m or rad], in its frame."""
+def opening_of(
+    joint: Joint,
+    start: Float[np.ndarray, "3"],
+    now: Float[np.ndarray, "3"],
+    about: float = _QUARTER,
+) -> float:
+    """By how much a joint has moved that took a point from `start` to `now` [m or rad], in its frame.
+
+    Args:
+      joint: Of the part.
+      start: `(3,)`.
+      now: `(3,)`.
+      about: By how much a hinge has moved, to within half a turn [rad]; by default doors are taken to be open by up to
+        three quarters of a turn.
+    """
     if joint.kind == "slide":
         return float((now - start) @ joint.axis)
     arms = [p - joint.origin for p in (start, now)]
     arms = [arm - (arm @ joint.axis) * joint.axis for arm in arms]
     sine = float(np.cross(arms[0], arms[1]) @ joint.axis)
-    return float(np.arctan2(sine, arms[0] @ arms[1]))
+    turned = np.arctan2(sine, arms[0] @ arms[1])
+    return float(turned + 2 * np.pi * np.round((about - turned) / (2 * np.pi)))
+
+
+def gone_along(joint: Joint, path: Float[np.ndarray, "n 3"]) -> float:
+    """By how much a joint has moved that took a point along a path, however far round [m or rad], in its frame."""
+    gone = 0.0
+    for now in path:
+        gone = opening_of(joint, path[0], now, gone)
+    return gone

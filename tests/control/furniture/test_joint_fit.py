@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from manipose_mj.assets.geometry import Joint
-from manipose_mj.control.furniture.joint_fit import fitted_joint, opening_of, points_of
+from manipose_mj.control.furniture.joint_fit import (
+    fitted_joint,
+    gone_along,
+    opening_of,
+    points_of,
+)
 from manipose_mj.poses import compose, rotation_about
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -94,6 +99,25 @@ def test_openings_are_what_brought_a_point_there():
     assert opening_of(HINGE, HANDLE, arc(0.7)[-1]) == pytest.approx(0.7, abs=0.01)
     slide = Joint("slide", HANDLE, AHEAD, (0.0, 0.3))
     assert opening_of(slide, HANDLE, HANDLE + [0.12, 0.03, 0.0]) == pytest.approx(0.12)
+
+
+@pytest.mark.parametrize("swing", [-1.2, 0.02, 1.6, 3.1, 3.2, 4.5])
+def test_doors_that_open_by_more_than_half_a_turn_are_not_shut(swing):
+    assert opening_of(HINGE, HANDLE, arc(swing)[-1]) == pytest.approx(swing, abs=0.01)
+    assert opening_of(HINGE, HANDLE, arc(swing)[-1], swing - 3.0) == pytest.approx(swing, abs=0.01)
+
+
+@pytest.mark.parametrize("swing", [-3.2, -0.5, 3.2, 5.0])
+def test_a_path_says_how_far_round_it_went(swing):
+    assert gone_along(HINGE, arc(swing)) == pytest.approx(swing, abs=0.01)
+
+
+@pytest.mark.parametrize("swing", [-0.1, 1.0, 3.1])
+def test_below_half_a_turn_an_opening_is_the_angle_bit_for_bit(swing):
+    path = arc(swing)
+    first, last = (np.append((p - HINGE.origin)[:2], 0.0) for p in (path[0], path[-1]))
+    angle = np.arctan2(np.cross(first, last) @ HINGE.axis, first @ last)
+    assert opening_of(HINGE, path[0], path[-1], 0.4) == gone_along(HINGE, path) == angle
 
 
 def test_a_drawer_slides_level_though_the_pull_lifts_the_hand():

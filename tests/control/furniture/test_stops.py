@@ -9,6 +9,8 @@ import pytest
 
 from manipose_mj.control.furniture.estimated_furniture import EstimatedFurniture
 from manipose_mj.control.furniture.stops import Stops, Swings
+from manipose_mj.poses import compose
+from tests.control.furniture.synthetic import FRONT
 from tests.control.furniture.test_opened_part import DOOR, MODEL
 
 USUAL = 0.32
@@ -81,3 +83,24 @@ def test_what_stays_where_it_was_pushed_is_at_its_end_unless_it_is_shut(opening,
     (part,) = furniture.model.parts
     assert part.part.joint.range == (0.0, end)
     assert part.opening == opening
+
+
+@pytest.mark.parametrize(
+    ("opening", "then"), [(0.3, 2.0), (1.5, 3.1), (3.0, 3.2), (3.3, 3.6), (3.2, 0.0)]
+)
+def test_a_door_in_the_hand_is_open_by_more_than_half_a_turn(opening, then):
+    task = SimpleNamespace(goals=(), furniture_masks=())
+    furniture = EstimatedFurniture(task, None, None, (), None)
+    furniture.model = MODEL.with_part(DOOR.at(opening))
+    shut = compose(np.eye(3), np.array([FRONT + 0.05, -0.15, 0.5]))
+    path = np.array([DOOR.motion(way) @ shut for way in np.linspace(opening, then, 30)])
+    furniture.hold("door", path[0])
+    for tcp_pose in path[1:]:
+        furniture.follow(tcp_pose)
+    assert furniture.model.parts[0].opening == pytest.approx(then, abs=1e-6)
+    furniture.model = MODEL.with_part(DOOR.at(opening))
+    furniture.hold("door", path[0])
+    furniture.feel("door", path, stopped=False)
+    assert furniture.model.parts[0].opening == pytest.approx(then, abs=0.01)
+    furniture.follow(path[-1])
+    assert furniture.model.parts[0].opening == pytest.approx(then, abs=0.01)
