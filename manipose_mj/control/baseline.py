@@ -179,7 +179,9 @@ class Baseline:
                     arm = scene.perception.arm
                     planner = MotionPlanner(estimate.scene, arm, timestep, rng, allowance)
                     step_by_step = self._planner.step_by_step(task.goals, estimate)
-                    candidates = self._planner.candidates(task.goals, estimate, planner)
+                    candidates = self._planner.candidates(
+                        task.goals, estimate, planner, task.config.tolerance
+                    )
                     candidate = _after(candidates, progress.failures_here)
                 else:
                     candidate = next(candidates)
@@ -257,7 +259,7 @@ class Baseline:
         if self._pose == "oracle" and self._errors == UNPERTURBED:
             return not task.succeeded(physics)
         estimate = executor.observe()
-        if self._errors == UNPERTURBED and lie_wrong(task.goals, estimate):
+        if self._errors == UNPERTURBED and lie_wrong(task.goals, estimate, task.config.tolerance):
             return True
         return executor.feels_joints and stand_wrong(task.goals, estimate)
 

@@ -30,7 +30,7 @@ from manipose_mj.control.planning.plan import CandidatePlan, Step
 from manipose_mj.control.planning.set_aside import places_aside
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.goals import Goal
+from manipose_mj.tasks.goals import Goal, Tolerance
 
 _NO_TEXT = "(no text)"  # endpoints refuse empty messages
 MAX_REPAIRS = 2
@@ -79,7 +79,11 @@ class LanguagePlanner:
         return False
 
     def candidates(
-        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+        self,
+        goals: tuple[Goal, ...],
+        estimate: SceneEstimate,
+        planner: MotionPlanner,
+        tolerance: Tolerance,
     ) -> Iterator[CandidatePlan]:
         """Plans that do what the model says, the straight one first.
 
@@ -87,6 +91,7 @@ class LanguagePlanner:
           goals: Of the task.
           estimate: What is where.
           planner: Of motions in the scene of `estimate`.
+          tolerance: The task's; a model is not told.
 
         Raises:
           InputError: The model does not answer, declines, or its last repair is still wrong.

@@ -14,11 +14,15 @@ from manipose_mj.control.planning.plan_articulated import (
     part_goal_plans,
     parts_to_look_behind,
 )
-from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter
+from manipose_mj.control.planning.rearrangement import (
+    USUAL_TOLERANCE,
+    candidate_moves,
+    in_clutter,
+)
 from manipose_mj.control.planning.transport import RestGoal, transport_plans
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.goals import Goal, InsideGoal, OnTableGoal, TakenOutGoal
+from manipose_mj.tasks.goals import Goal, InsideGoal, OnTableGoal, TakenOutGoal, Tolerance
 
 
 class TaskPlanner(Protocol):
@@ -42,7 +46,11 @@ class TaskPlanner(Protocol):
         ...
 
     def candidates(
-        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+        self,
+        goals: tuple[Goal, ...],
+        estimate: SceneEstimate,
+        planner: MotionPlanner,
+        tolerance: Tolerance,
     ) -> Iterator[CandidatePlan]:
         """Plans that reach the goals, the most promising first, at least one.
 
@@ -50,6 +58,7 @@ class TaskPlanner(Protocol):
           goals: All of them.
           estimate: What is where.
           planner: Of motions in the scene of `estimate`.
+          tolerance: The task's: what counts as reached.
 
         Raises:
           InputError: On the way through them: there is none, or there are no more.
@@ -73,14 +82,21 @@ class RulePlanner:
         return in_clutter(goals, estimate)
 
     def candidates(
-        self, goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+        self,
+        goals: tuple[Goal, ...],
+        estimate: SceneEstimate,
+        planner: MotionPlanner,
+        tolerance: Tolerance,
     ) -> Iterator[CandidatePlan]:
         """As `candidate_plans`."""
-        return candidate_plans(goals, estimate, planner)
+        return candidate_plans(goals, estimate, planner, tolerance)
 
 
 def candidate_plans(
-    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner | None = None
+    goals: tuple[Goal, ...],
+    estimate: SceneEstimate,
+    planner: MotionPlanner | None = None,
+    tolerance: Tolerance = USUAL_TOLERANCE,
 ) -> Iterator[CandidatePlan]:
     """Plans that reach the goals, one after the other; the most promising first, at least one.
 
@@ -90,13 +106,14 @@ def candidate_plans(
       goals: All of them.
       estimate: What is where.
       planner: Of motions in the scene of `estimate`; without one nothing is set down on the way.
+      tolerance: The task's: in clutter, what counts as reached.
 
     Raises:
       InputError: On the way through them. A goal is of a kind that has no plan or names something that is not there,
         an object fits a cavity in no orientation, or in clutter there are no more.
     """
     if planner is not None and in_clutter(goals, estimate):
-        yield from candidate_moves(goals, estimate, planner)
+        yield from candidate_moves(goals, estimate, planner, tolerance)
         return
     for part in parts_to_look_behind(goals, estimate):
         for plan in opening_plans(part, estimate):
@@ -107,10 +124,13 @@ def candidate_plans(
 
 
 def make_plan(
-    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner | None = None
+    goals: tuple[Goal, ...],
+    estimate: SceneEstimate,
+    planner: MotionPlanner | None = None,
+    tolerance: Tolerance = USUAL_TOLERANCE,
 ) -> Plan:
     """The most promising plan; arguments and errors as for `candidate_plans`."""
-    return next(candidate_plans(goals, estimate, planner)).steps()
+    return next(candidate_plans(goals, estimate, planner, tolerance)).steps()
 
 
 def _plans_of_each(

@@ -26,10 +26,11 @@ from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.poses import pose_error
-from manipose_mj.tasks.goals import Goal, OnTableGoal, PoseGoal
+from manipose_mj.tasks.goals import Goal, OnTableGoal, PoseGoal, Tolerance
 
-# A goal that is met with so much to spare is left alone [m, rad].
-_MET = (0.018, radians(13))
+USUAL_TOLERANCE = Tolerance()  # of tasks that set none of their own
+# Of the task's tolerance: a goal that is met to within so much is left alone, by translation and rotation.
+_MET = (0.018 / 0.02, radians(13) / radians(15))
 _CLOSE = 0.012  # between objects of one crowd [m]
 _CROWDED = 0.04  # between the circles about objects, which are wider than most of them [m]
 _TOUCHING = 0.002  # [m]
@@ -46,7 +47,10 @@ def in_clutter(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
 
 
 def candidate_moves(
-    goals: tuple[Goal, ...], estimate: SceneEstimate, planner: MotionPlanner
+    goals: tuple[Goal, ...],
+    estimate: SceneEstimate,
+    planner: MotionPlanner,
+    tolerance: Tolerance = USUAL_TOLERANCE,
 ) -> Iterator[CandidatePlan]:
     """Next moves, the most promising first; a single one without steps when every pose is reached.
 
@@ -58,6 +62,7 @@ def candidate_moves(
       goals: All of them.
       estimate: What is where; targets may be missing.
       planner: Of motions in the scene of `estimate`.
+      tolerance: The task's: what is left alone meets its goal with a little of it to spare.
 
     Raises:
       InputError: There are no more moves.
@@ -65,7 +70,7 @@ def candidate_moves(
     pose_goals = [goal for goal in goals if isinstance(goal, PoseGoal)]
     seen = [goal for goal in pose_goals if goal.object in estimate.objects]
     hidden = [goal.object for goal in pose_goals if goal.object not in estimate.objects]
-    unmet = [goal for goal in seen if not _met(goal, estimate.objects[goal.object])]
+    unmet = [goal for goal in seen if not _met(goal, estimate.objects[goal.object], tolerance)]
     if not unmet and not hidden:
         yield CandidatePlan(tuple)
         return
@@ -227,9 +232,9 @@ def _nearby(unmet: list[PoseGoal], estimate: SceneEstimate) -> list[ObjectEstima
     return [estimate.objects[n] for n in sorted(gaps, key=lambda n: gaps[n]) if gaps[n] < _CROWDED]
 
 
-def _met(goal: PoseGoal, obj: ObjectEstimate) -> bool:
-    translation, rotation = pose_error(obj.label_pose, goal.pose, obj.label.symmetry)
-    return bool(translation < _MET[0] and rotation < _MET[1])
+def _met(goal: PoseGoal, obj: ObjectEstimate, tolerance: Tolerance) -> bool:
+    shift, turn = pose_error(obj.label_pose, goal.pose, obj.label.symmetry)
+    return bool(shift < _MET[0] * tolerance.translation and turn < _MET[1] * tolerance.rotation)
 
 
 def _lies_under_others(

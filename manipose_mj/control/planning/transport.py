@@ -45,18 +45,17 @@ def transport_plans(
             yield place(goal.object, at_edge)
 
 
-def lie_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
-    """Whether an object is seen to lie otherwise than a goal has it."""
+def lie_wrong(goals: tuple[Goal, ...], estimate: SceneEstimate, tolerance: Tolerance) -> bool:
+    """Whether an object is seen to lie otherwise than a goal has it, by more than the task's tolerance."""
     symmetries = {name: obj.label.symmetry for name, obj in estimate.objects.items()}
-    most = Tolerance()
     for goal in goals:
         frame = goal.goal_frame(symmetries) if isinstance(goal, RestGoal) else None
         if frame is None:
             continue
         pose = estimate.objects[frame.object].label_pose
         shift, turn = pose_error(pose, np.asarray(frame.pose), frame.symmetry)
-        moved = frame.translation_counts and shift > most.translation
-        if moved or (frame.rotation_counts and turn > most.rotation):
+        moved = frame.translation_counts and shift > tolerance.translation
+        if moved or (frame.rotation_counts and turn > tolerance.rotation):
             return True
     return False
 

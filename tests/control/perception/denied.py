@@ -42,7 +42,7 @@ class _TimeOnly:
 
 
 class DeniedTask(ManipulationTask):
-    """A task that tells its goals, the categories and masks of things, what sensors there are and measure."""
+    """A task that tells its goals and their tolerance, the categories and masks of things, what sensors there are and measure."""
 
     def __init__(self, task: ManipulationTask) -> None:
         object.__setattr__(self, "_task", task)
@@ -56,6 +56,8 @@ class DeniedTask(ManipulationTask):
             return object.__getattribute__(self, name)
         if name in ("goals", "furniture_masks", "surroundings_masks", "control_timestep"):
             return getattr(task, name)
+        if name == "config":
+            return SimpleNamespace(tolerance=task.config.tolerance)
         if name == "robot":
             return _Robot(task.robot)
         if name == "objects":

@@ -10,7 +10,7 @@ import pytest
 from manipose_mj.control.execution.slip import closed_past
 from manipose_mj.control.planning.transport import lie_wrong
 from manipose_mj.poses import compose, rotation_about
-from manipose_mj.tasks.goals import OpenGoal, PoseGoal, UprightGoal
+from manipose_mj.tasks.goals import OpenGoal, PoseGoal, Tolerance, UprightGoal
 from tests.control.language.scenes import rigid, scene
 
 CAN = rigid("can", "can", (0.12, 0.066, 0.066), (0.45, 0.1, 0.06))
@@ -28,13 +28,30 @@ def goal_off(shift: float, turn: float) -> PoseGoal:
     [(0.015, 10, False), (0.03, 0, True), (0.0, 30, True), (0.021, 0, True), (0.0, 16, True)],
 )
 def test_what_toppled_or_rolled_away_lies_wrong(shift, degrees, wrong):
-    assert lie_wrong((goal_off(shift, np.deg2rad(degrees)),), scene([CAN], [])) is wrong
+    goal = goal_off(shift, np.deg2rad(degrees))
+    assert lie_wrong((goal,), scene([CAN], []), Tolerance()) is wrong
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "shift", "degrees", "wrong"),
+    [
+        (Tolerance(translation=0.05), 0.04, 0, False),
+        (Tolerance(translation=0.05), 0.0, 16, True),
+        (Tolerance(translation=0.005), 0.01, 0, True),
+        (Tolerance(rotation=0.5), 0.0, 25, False),
+        (Tolerance(rotation=0.05), 0.0, 5, True),
+    ],
+)
+def test_what_is_wrong_is_for_the_task_to_say(tolerance, shift, degrees, wrong):
+    goal = goal_off(shift, np.deg2rad(degrees))
+    assert lie_wrong((goal,), scene([CAN], []), tolerance) is wrong
 
 
 def test_a_turn_about_the_axis_and_other_goals_do_not_count():
     spun = rotation_about(np.array([0.0, 0.0, 1.0]), 2.0) @ CAN.label_pose[:3, :3]
     goal = PoseGoal("can", compose(spun, CAN.label_pose[:3, 3]))
-    assert not lie_wrong((goal, UprightGoal("can"), OpenGoal("drawer")), scene([CAN], []))
+    goals = (goal, UprightGoal("can"), OpenGoal("drawer"))
+    assert not lie_wrong(goals, scene([CAN], []), Tolerance())
 
 
 @pytest.mark.parametrize(

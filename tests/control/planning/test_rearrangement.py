@@ -10,15 +10,17 @@ import pytest
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
+from manipose_mj.control.planning import rearrangement
 from manipose_mj.control.planning.obstructions import blockers_of
+from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.control.planning.rearrangement import candidate_moves, in_clutter, is_supported
 from manipose_mj.control.planning.set_aside import places_aside, radius
 from manipose_mj.control.planning.table_places import is_free
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import episode
-from manipose_mj.poses import compose, invert
+from manipose_mj.poses import compose, invert, rotation_about
 from manipose_mj.tasks.core.config import EpisodeSpec
-from manipose_mj.tasks.goals import PoseGoal
+from manipose_mj.tasks.goals import PoseGoal, Tolerance
 from tests.few_objects import config, load
 
 SEED = 1
@@ -116,6 +118,39 @@ def test_nothing_is_left_to_do_once_the_target_is_there(stacked):
     assert [move.steps() for move in moves] == [()]
     obj.place(environment.physics, before)
     environment.physics.forward()
+
+
+@pytest.mark.parametrize(
+    ("shift", "degrees", "tolerance", "done"),
+    [
+        (0.0179, 12.9, Tolerance(), True),
+        (0.0181, 0.0, Tolerance(), False),
+        (0.0, 13.1, Tolerance(), False),
+        (0.044, 0.0, Tolerance(translation=0.05), True),
+        (0.046, 0.0, Tolerance(translation=0.05), False),
+        (0.01, 0.0, Tolerance(translation=0.005), False),
+        (0.0, 25.0, Tolerance(rotation=np.radians(30)), True),
+        (0.0, 4.5, Tolerance(rotation=np.radians(5)), False),
+    ],
+)
+def test_what_is_left_alone_meets_the_tolerance_of_the_task(
+    stacked, shift, degrees, tolerance, done
+):
+    environment, perception, planner = stacked
+    estimate, goal = perception.observe(), _target_goal(environment.task)
+    obj = estimate.objects["object"]
+    tilt = rotation_about(obj.label_pose[:3, 0], np.radians(degrees))
+    tilt = compose(tilt @ goal.pose[:3, :3], goal.pose[:3, 3] + [shift, 0.0, 0.0])
+    lying = replace(obj, pose=tilt @ invert(obj.label.pose))
+    there = replace(estimate, objects={**estimate.objects, "object": lying})
+    plan = make_plan(environment.task.goals, there, planner, tolerance)
+    assert (plan == ()) is done
+
+
+def test_by_default_2_mm_and_2_deg_are_to_spare_to_the_bit():
+    shares, usual = rearrangement._MET, Tolerance()
+    assert shares[0] * usual.translation == 0.018
+    assert shares[1] * usual.rotation == np.radians(13)
 
 
 def test_a_motion_that_does_not_touch_the_pile_ignores_its_own_contacts(stacked):
