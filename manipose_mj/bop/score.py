@@ -33,7 +33,7 @@ class TargetErrors:
       mssd: Share of the diameter.
       mspd: [pixels] of an image 640 wide.
       add: ADD, or ADD-S of an object with symmetries, as a share of the diameter.
-      origin: Between the models' origins [m].
+      origin: Between the models' origins, the least over the symmetries [m].
       rotation: The least over the symmetries [rad].
     """
 
@@ -52,9 +52,9 @@ def target_errors(estimate: Estimate, target: Target, model: Model) -> TargetErr
     maps, vertices = model.symmetry.transforms, model.vertices
     average = add if len(maps) == 1 else add_s
     turned = compose(model.symmetry.frame, np.zeros(3))
-    origin, rotation = pose_error(
-        estimate.pose @ turned, target.truth @ turned, model.symmetry.group
-    )
+    _, rotation = pose_error(estimate.pose @ turned, target.truth @ turned, model.symmetry.group)
+    origins = (estimate.pose @ maps)[:, :3, 3]  # those of other data sets may be about other points
+    origin = np.linalg.norm(origins - target.truth[:3, 3], axis=1).min()
     pixels = mspd(estimate.pose, target.truth, maps, vertices, target.matrix)
     return TargetErrors(
         mssd=mssd(estimate.pose, target.truth, maps, vertices) / model.diameter,

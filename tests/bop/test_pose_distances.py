@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from manipose_mj.bop.dataset import Model, Target
 from manipose_mj.bop.pose_distances import add, add_s, mspd, mssd
+from manipose_mj.bop.results_csv import Estimate
+from manipose_mj.bop.score import target_errors
 from manipose_mj.bop.symmetries import TURNS, model_symmetry
 from manipose_mj.poses import compose
 
@@ -124,3 +127,19 @@ def test_kinds_and_frames_of_symmetries():
 def test_what_is_no_symmetry(info, message):
     with pytest.raises(ValueError, match=message):
         model_symmetry(info)
+
+
+@pytest.mark.parametrize("kind", ["discrete", "axial"])
+def test_origins_are_compared_up_to_symmetries_about_other_points(kind):
+    symmetry = model_symmetry(INFOS[kind])
+    vertices = np.random.default_rng(0).normal(0, 0.03, (40, 3))
+    truth = compose(Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix(), np.array([0.1, 0.0, 0.8]))
+    target = Target(0, 0, 1, truth, K, 640)
+    model = Model(vertices, 0.2, symmetry, "", "")
+    turned = truth @ symmetry.transforms[len(symmetry.transforms) // 2]
+    assert np.linalg.norm((turned - truth)[:3, 3]) > 0.02
+    errors = target_errors(Estimate(0, 0, 1, 1.0, turned, -1.0), target, model)
+    assert errors.origin < 1e-9 and errors.rotation < 1e-6
+    beside = compose(np.eye(3), np.array([0.0, 0.0, 0.05])) @ turned
+    errors = target_errors(Estimate(0, 0, 1, 1.0, beside, -1.0), target, model)
+    assert 0.02 < errors.origin <= 0.05 + 1e-9

@@ -79,9 +79,13 @@ def rotation_vector(rotation: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "
     sine = np.linalg.norm(sine_axis, axis=-1)
     cosine = (np.trace(rotation, axis1=1, axis2=2) - 1) / 2
     angle = np.arctan2(sine, cosine)
-    # Half a turn leaves no sine to divide by; any axis will do for one step of a search.
     scale = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
-    return sine_axis * scale[:, None]
+    vector = sine_axis * scale[:, None]
+    # Half a turn leaves no sine to divide by: R + I is then twice the axis times itself.
+    for i in np.flatnonzero((sine <= 1e-9) & (cosine < 0)):
+        column = (rotation[i] + np.eye(3))[:, np.argmax(np.diag(rotation[i]))]
+        vector[i] = np.pi * column / np.linalg.norm(column)
+    return vector
 
 
 def seeds_for(targets: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "s n 7"]:

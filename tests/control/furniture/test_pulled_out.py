@@ -93,3 +93,11 @@ def test_a_drawer_that_the_hand_slipped_off_is_what_it_was():
     shut = face(FRONT, [-0.2, 0.0], [0.2, 0.45], 0.004)
     before = led(0.25)
     assert as_it_moved(before, shut) is before
+
+
+def test_parts_that_make_room_get_names_of_their_own():
+    (drawer,) = cabinet().parts
+    names = ("part_0", "top_drawer", "part_3")
+    parts = [replace(drawer, part=replace(drawer.part, name=name)) for name in names]
+    model = replace(cabinet(), parts=tuple(parts)).with_another(parts[1])
+    assert [part.name for part in model.parts] == ["part_0", "part_4", "part_3", "top_drawer"]

@@ -69,6 +69,12 @@ def test_rotation_vectors_are_axis_times_angle():
     np.testing.assert_allclose(
         rotation_vector(rotations.as_matrix()), rotations.as_rotvec(), atol=1e-9
     )
+    axes = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.0, 0.8], [0.0, -0.6, 0.8]])
+    halves = 2 * axes[:, :, None] * axes[:, None] - np.eye(3)
+    found = rotation_vector(halves)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.pi)
+    np.testing.assert_allclose(np.abs((found * axes).sum(axis=1)), np.pi)
+    np.testing.assert_array_equal(rotation_vector(np.eye(3)[None]), np.zeros((1, 3)))
 
 
 def test_poses_over_the_table_are_reached_and_poses_out_of_reach_are_not():

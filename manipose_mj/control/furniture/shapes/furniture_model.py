@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from itertools import count
 
 import numpy as np
 from jaxtyping import Float
@@ -125,10 +126,10 @@ class FurnitureModel:
 
     def with_another(self, part: PartModel) -> FurnitureModel:
         """The same with one more part; what had its name is kept under another."""
+        names = {each.name for each in self.parts}
+        other = next(name for i in count(len(names)) if (name := f"part_{i}") not in names)
         others = [
-            replace(each, part=replace(each.part, name=f"part_{len(self.parts)}"))
-            if each.name == part.name
-            else each
+            replace(each, part=replace(each.part, name=other)) if each.name == part.name else each
             for each in self.parts
         ]
         return replace(self, parts=(*others, part))
