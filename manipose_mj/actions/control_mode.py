@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dm_control import mjcf
 from dm_env import specs
@@ -75,7 +77,7 @@ class ControlMode:
         self._memory = Memory(*fields)
 
 
-def checked_action(mode: str, shape: tuple[int, ...], action: object) -> Float[np.ndarray, "n"]:
+def checked_action(mode: str, shape: tuple[int, ...], action: Any) -> Float[np.ndarray, "n"]:
     """The action as an array of the shape that the mode of this name takes.
 
     Raises:
