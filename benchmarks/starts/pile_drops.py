@@ -1,6 +1,6 @@
 """Print where objects begin to fall in piles, and how much room they are given beside their goals.
 
-python benchmarks/experiments/pile_drops.py [pen_006 pencil_000 ...] [--drops 100]
+python benchmarks/starts/pile_drops.py [pen_006 pencil_000 ...] [--drops 100]
 
 Both take the origin of an object's label for the middle of its box. That of a tool is elsewhere.
 """
