@@ -27,8 +27,7 @@ from mujoco import rollout
 from manipose_mj import batch
 from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.row_models import RowModels
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation

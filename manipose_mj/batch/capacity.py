@@ -12,9 +12,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from manipose_mj.batch.row_models import RowModels, awake
 from manipose_mj.batch.simulator import Simulator, packed, state_words
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import RowModels, StartPool, awake
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING

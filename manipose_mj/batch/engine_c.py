@@ -14,9 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
 from manipose_mj.batch.measurement import FlatMeasurement, Measurement, flat_values
-from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.simulator import Simulator, packed, state_words
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from manipose_mj.poses import Array

@@ -58,8 +58,6 @@ def make(
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.
     """
     require_worlds(worlds)
-    if not isinstance(task, str):
-        raise InputError(f'task is {task!r}; expected "domain/name"')
     if seeds is None:
         check_seed(seed)
         seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))

@@ -8,10 +8,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Int
 
-from manipose_mj.batch.row_models import RowModels, awake
 from manipose_mj.batch.slot_bodies import ScenePlaces
 from manipose_mj.batch.slot_model import SlotModel, slot_model
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import RowModels, StartPool, awake
 from manipose_mj.mjcf.panda.servos import ServoAddresses
 from manipose_mj.poses import quaternion_to_rotation
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation

@@ -12,8 +12,7 @@ from jaxtyping import Bool, Float, Int, UInt32
 
 from manipose_mj.batch.measurement import FlatMeasurement, flat_values
 from manipose_mj.batch.measurer import Measurer, read_views
-from manipose_mj.batch.row_models import RowModels
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.mjcf.panda.servos import ServoAddresses, ServoGroup, Servos
 from manipose_mj.tasks.core.simulation_state import FlatReader, unflatten, write_simulation
 

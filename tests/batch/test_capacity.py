@@ -9,7 +9,7 @@ import pytest
 from manipose_mj.batch import Capacity
 from manipose_mj.batch.capacity import Peaks, near_pairs, probe, touching_pairs
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.starts import RowModels
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation

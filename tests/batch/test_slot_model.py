@@ -10,8 +10,8 @@ import pytest
 
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.row_fields import RowFields, _fields_of
-from manipose_mj.batch.row_models import RowModels
 from manipose_mj.batch.slot_model import slot_model
+from manipose_mj.batch.starts import RowModels
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EnvConfig
 

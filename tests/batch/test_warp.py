@@ -13,7 +13,7 @@ from manipose_mj.batch import Capacity
 from manipose_mj.batch.capacity import near_pairs, touching_pairs
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import WARP_ON_CPU
-from manipose_mj.batch.row_models import RowModels, awake
+from manipose_mj.batch.starts import RowModels, awake
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 from tests.batch.batched import wandering

@@ -244,6 +244,8 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
     ):
         with pytest.raises(InputError, match=message):
             make(TASK, **arguments)
+    with pytest.raises(InputError, match=r"task is \('articulated', 'open'\); expected"):
+        batch.make(cast(Any, ("articulated", "open")), worlds=1, engine="c")
     with pytest.raises(InputError, match="2 seeds for 3 worlds"):
         worlds.at([7, 8])
     with pytest.raises(InputError, match="seeds is 7; expected a sequence"):

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from manipose_mj.batch.row_models import RowModels
+from manipose_mj.batch.starts import RowModels
 from manipose_mj.batch.state import State
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, unknown_name

@@ -121,8 +121,10 @@ def env_config(task: str, options: EnvOptions) -> EnvConfig:
       options: Fields of `EnvConfig`.
 
     Raises:
-      InputError: It has no such field, or one holds what it cannot.
+      InputError: The task is no name, or a field is unknown or holds what it cannot.
     """
+    if not isinstance(task, str):
+        raise InputError(f'task is {task!r}; expected "domain/name"')
     for name in options:
         if name not in EnvOptions.__annotations__:
             raise unknown_name("option", name, EnvOptions.__annotations__)
