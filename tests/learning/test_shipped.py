@@ -38,8 +38,8 @@ def test_they_are_small_and_say_what_they_are():
 @pytest.mark.parametrize(
     ("name", "pieces", "least"),
     [
-        ("open_middle_drawer", (4, 14, 19, 24), 21),  # in single environments 97 %
-        ("open_cabinet_door", (4, 9, 14, 34, 39), 21),  # 94 %
+        ("open_middle_drawer", (4, 14, 19, 24), 22),  # in single environments 97 %
+        ("open_cabinet_door", (4, 9, 14, 34, 39), 22),  # 94 %
     ],
 )
 def test_they_open_parts_of_cabinets_that_they_were_not_trained_on(tmp_path, name, pieces, least):
@@ -80,4 +80,4 @@ def test_it_lifts_objects_that_it_was_not_trained_on(tmp_path, monkeypatch):
     results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert len(results) == 48
     # In single environments 90 %.
-    assert sum(result["success_at_end"] for result in results) >= 37
+    assert sum(result["success_at_end"] for result in results) >= 38
