@@ -108,12 +108,30 @@ def test_wrong_input_is_one_line(tmp_path):
 @pytest.mark.full
 def test_engine_warp_comes_to_the_same_verdicts(asset):
     pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
-    from asset_pipeline.grasp_survival.engine_warp import held_warp
+    from asset_pipeline.grasp_survival.engine_warp import Batch, held_warp
 
     grid = trial_grid(asset.grasps, asset.stable_poses, HAND, FEW)
-    held, counts = held_warp(GridTrial(asset.model_path, HAND, CONFIG), grid)
+    trial = GridTrial(asset.model_path, HAND, CONFIG)
+    expected = held_c(asset.model_path, grid, HAND, CONFIG)
+    held, counts = held_warp(trial, grid)
     assert counts.all()
-    assert (held == held_c(asset.model_path, grid, HAND, CONFIG)).mean() >= 0.9
+    assert (held == expected).mean() >= 0.9
+    # Worlds that try one after another come to what each alone comes to.
+    again, counts = Batch(trial, 5).held(grid)
+    assert counts.all()
+    np.testing.assert_array_equal(again, held)
+
+
+@pytest.mark.full
+def test_trials_without_room_are_tried_again_with_more(asset):
+    pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
+    from asset_pipeline.grasp_survival.engine_warp import Batch, Room
+
+    grid = trial_grid(asset.grasps, asset.stable_poses, HAND, FEW).part(slice(0, 4))
+    trial = GridTrial(asset.model_path, HAND, CONFIG)
+    held, counts = Batch(trial, 2, Room(contacts=1, rows=8)).held(grid)
+    assert counts.all()
+    np.testing.assert_array_equal(held, held_c(asset.model_path, grid, HAND, CONFIG))
 
 
 def test_what_builds_assets_does_not_load_the_gpu_libraries():
