@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from asset_pipeline.build.relabel import measured, relabelled
 from asset_pipeline.labelling.overrides.applying import moved, overridden
+from asset_pipeline.labelling.overrides.other_axes import symmetries_along
 from asset_pipeline.labelling.overrides.reading import (
     FrameOverride,
     Override,
@@ -23,7 +24,7 @@ from manipose_mj.assets.asset_json import list_assets, read_asset
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.symmetry_names import SYMMETRIES, symmetry_name
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, unknown_name
 
 # What is moved: the object's own label, else the handle of the part of this name.
 OBJECT = "object"
@@ -160,10 +161,11 @@ class LabelSession:
     def _entry(self, entry: dict[str, Any]) -> dict[str, Any]:
         """The object's entry with the moved frame in place of any other word on that frame."""
         if self.target == OBJECT:
-            return _frame(entry, self.label)
+            return _frame(entry, self.label, measured(self.asset).label)
         parts = dict(entry.get("parts", {}))
         part = dict(parts.get(self.target, {}))
-        part["handle"] = _frame(dict(part.get("handle", {})), self.label)
+        found = measured(self.asset).part(self.target).handle
+        part["handle"] = _frame(dict(part.get("handle", {})), self.label, found)
         return {**entry, "parts": {**parts, self.target: part}}
 
     def _try(self, override: Override) -> None:
@@ -172,14 +174,34 @@ class LabelSession:
         overridden(measured(self.asset), override, surface(shapes), textured=textured)
 
 
-def _frame(entry: dict[str, Any], label: PoseLabel) -> dict[str, Any]:
-    """An entry's fields with this frame, and its symmetry where that has a name."""
+def _frame(entry: dict[str, Any], label: PoseLabel, found: PoseLabel | None) -> dict[str, Any]:
+    """An entry's fields with this frame, and its symmetry where it has a name and is not what was measured.
+
+    Args:
+      entry: Of the object or the handle.
+      label: As it shall be.
+      found: As it was measured; None where a person added it.
+    """
     replaced = ("origin", "x", "y", "rotation", "adjust", "symmetry")
     numbers = {"origin": label.origin, "x": label.rotation[:, 0], "y": label.rotation[:, 1]}
     fields: dict[str, Any] = {k: (np.round(v, DIGITS) + 0.0).tolist() for k, v in numbers.items()}
-    if (name := symmetry_name(label.symmetry)) in SYMMETRIES:
+    name = symmetry_name(label.symmetry)
+    if name in SYMMETRIES and (found is None or not _follows(label, found)):
         fields["symmetry"] = name
     return fields | {key: value for key, value in entry.items() if key not in replaced}
+
+
+def _follows(label: PoseLabel, found: PoseLabel) -> bool:
+    """Whether the symmetry of the shape and of its print are those that the measured label has in these axes."""
+    try:
+        symmetry, printed = symmetries_along(found, label.rotation)
+    except InputError:
+        return False
+    own = label.print_symmetry
+    alike = symmetry_name(symmetry) == symmetry_name(label.symmetry)
+    if printed is None or own is None:
+        return alike and printed is own
+    return alike and symmetry_name(printed) == symmetry_name(own)
 
 
 def _uncertainty(asset: Asset) -> tuple[float, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,13 @@ import yaml
 
 import tests.asset_pipeline.labelled_assets as made
 from asset_pipeline.viewers.label_session import OBJECT, LabelSession
-from manipose_mj.assets.asset_json import read_asset
+from manipose_mj.assets.asset_json import read_asset, write_asset_json
 from manipose_mj.assets.label_marks import label_lines, symmetry_planes
 from manipose_mj.assets.symmetry_names import SYMMETRIES, symmetry_name
 from manipose_mj.assets.visible_shapes import visible_shapes
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
-from manipose_mj.poses import compose, rotation_about, rotation_angle
+from manipose_mj.poses import SymmetryGroup, compose, rotation_about, rotation_angle
 
 
 @pytest.fixture
@@ -81,6 +82,21 @@ def test_symmetry_goes_with_the_axes_that_a_person_sees(session, assets):
     session.save()
     assert symmetry_name(read_asset(assets / "unsure").label.symmetry) == "axis"
     assert yaml.safe_load(session.labels.read_text())["unsure"]["symmetry"] == "axis"
+
+
+def test_a_label_that_keeps_its_symmetry_keeps_that_of_its_print(tmp_path):
+    block = made.block(tmp_path / "assets" / "printed")
+    printed = replace(block.label, print_symmetry=SymmetryGroup.identity())
+    write_asset_json(replace(block, label=printed))
+    session = LabelSession(tmp_path / "assets", tmp_path / "labels.yaml")
+    session.shift(0, 0.01)
+    session.save()
+    label = read_asset(tmp_path / "assets" / "printed").label
+    assert label.print_symmetry is not None and len(label.print_symmetry.rotations) == 1
+    assert "symmetry" not in yaml.safe_load(session.labels.read_text())["printed"]
+    session.set_symmetry(symmetry_name(label.symmetry))  # of its print as well
+    session.save()
+    assert read_asset(tmp_path / "assets" / "printed").label.print_symmetry is None
 
 
 def test_saving_keeps_what_else_the_file_says(session, assets):
