@@ -163,6 +163,12 @@ class EvaluationConfig:
             raise InputError(
                 f"{errors.of_cameras[0]}: the policy sees no images; --obs-mode names none"
             )
+        if errors.cameras and self.policy.obs_format == "droid":
+            from manipose_mj.gym.features import CAMERAS
+
+            lacking = [name for name in CAMERAS.values() if name not in errors.cameras]
+            if lacking:
+                raise InputError(f"--cameras: DROID's format needs {' and '.join(lacking)} too")
 
     def _check_grasps(self) -> None:
         if self.grasps is None:

@@ -90,6 +90,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
             self.action_space, _, self._unscaled = rescale_box(self.action_space, low, high)
         self._terminate_on_success = terminate_on_success
         self._view = View(render_mode, camera, height, width)
+        self._view.check(self.environment.physics)
         self._running = self._closed = False
 
     def reset(

@@ -9,7 +9,9 @@ import numpy as np
 from dm_control import mjcf
 from jaxtyping import UInt8
 
+from manipose_mj.errors import check_count
 from manipose_mj.mjcf.cameras.pictures import painter
+from manipose_mj.mjcf.cameras.ray_camera import camera_id
 from manipose_mj.mjcf.views.viewer import open_viewer, require_display
 
 
@@ -20,8 +22,10 @@ class View:
         """Opens nothing yet.
 
         Raises:
-          InputError: A window is asked for and there is no display.
+          InputError: A window is asked for and there is no display, or a size is none.
         """
+        check_count("height of pictures", height, least=1)
+        check_count("width of pictures", width, least=1)
         if render_mode == "human":
             require_display()
         self._mode = render_mode
@@ -30,6 +34,11 @@ class View:
         self._model: Any = None
         self._shown: Any = None
         self._stack = ExitStack()
+
+    def check(self, physics: mjcf.Physics) -> None:
+        """Raises InputError where pictures are asked for and the scene has no such camera."""
+        if self._mode == "rgb_array":
+            camera_id(physics.model.ptr, self._camera)
 
     def render(self, physics: mjcf.Physics) -> UInt8[np.ndarray, "height width 3"] | None:
         """The picture, or None where a window shows it."""

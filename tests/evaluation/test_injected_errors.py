@@ -77,6 +77,11 @@ def test_the_command_line_makes_the_errors_it_names(tmp_path, monkeypatch):
         ({"camera_error_deg": 1.0}, {"pose": "oracle"}, "--camera-error-deg: with true poses"),
         ({"depth_noise": 2.0}, {"pose": "oracle"}, "--depth-noise: with true poses"),
         ({"pose_error_cm": 1.0}, {"pose": "oracle", "policy": POLICY}, "sees no poses"),
+        (
+            {"cameras": ("front", "right")},
+            {"pose": "oracle", "policy": PolicySettings("a:b", obs_format="droid")},
+            "--cameras: DROID's format needs panda/wrist too",
+        ),
         ({"cameras": ("front",)}, {"pose": "oracle", "policy": POLICY}, "sees no images"),
         ({"assume_upright": True}, {"pose": "oracle", "policy": POLICY}, "of the baseline"),
     ],

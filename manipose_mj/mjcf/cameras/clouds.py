@@ -117,9 +117,10 @@ def cloud_from_depth(
       InputError: An image's shape is not that of the intrinsics.
     """
     shape = (intrinsics.height, intrinsics.width)
-    for name, image in (("depth", depth), ("instance", instance)):
-        if image.shape != shape:
-            raise InputError(f"{name} image is {image.shape}; the intrinsics say {shape}")
+    images = {"depth": depth, "instance": instance, "normal": normal, "colour": colour}
+    for name, image in images.items():
+        if image is not None and image.shape[:2] != shape:
+            raise InputError(f"{name} image is {image.shape[:2]}; the intrinsics say {shape}")
     kept = np.isfinite(depth) & (depth > 0) & (instance >= 0)
     keep = np.flatnonzero(kept.ravel())
     if normal is None:

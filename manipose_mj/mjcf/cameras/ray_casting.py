@@ -360,11 +360,14 @@ def _runs(
 
 @contextmanager
 def _own_culling(model: mujoco.MjModel) -> Iterator[None]:
-    """What `mj_multiRay` culls by is as before afterwards; meanwhile nothing is culled by volumes."""
-    changed = (model.geom_group, model.body_geomadr, model.body_geomnum, model.body_bvhadr)
+    """What `mj_multiRay` culls by is as before afterwards; meanwhile nothing is culled by volumes or materials."""
+    alpha = model.mat_rgba[:, 3]
+    changed = (model.geom_group, model.body_geomadr, model.body_geomnum, model.body_bvhadr, alpha)
     kept = [values.copy() for values in changed]
     try:
         model.body_bvhadr[:] = -1  # a body without bounding volumes is not culled
+        # A geom of its own colour is seen whatever its material's is; groups say which are.
+        alpha[:] = 1.0
         yield
     finally:
         for values, before in zip(changed, kept, strict=True):

@@ -29,7 +29,7 @@ class SurfaceColours:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self.textured = _texture_of_geom(model) >= 0
-        self._lookups: dict[tuple[int, int, int], _Lookup | None] = {}
+        self._lookups: dict[tuple[float, ...], _Lookup | None] = {}
 
     def at(
         self,
@@ -64,6 +64,7 @@ class SurfaceColours:
             int(model.geom_matid[geom]),
             int(model.geom_dataid[geom]),
             int(model.geom_type[geom]),
+            *model.geom_size[geom, :2].tolist(),  # a texture is stretched over a plane
         )
         if key not in self._lookups:
             self._lookups[key] = _make_lookup(model, geom)
@@ -99,7 +100,7 @@ def _make_lookup(model: mujoco.MjModel, geom: int) -> _Lookup | None:
         return _plane_lookup(model, geom, image)
     is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
     if flat and is_mesh and model.mesh_texcoordadr[mesh] >= 0:
-        return _mesh_lookup(model, mesh, image)
+        return _mesh_lookup(model, geom, image)
     mean = image.reshape(-1, 3).mean(axis=0)
     return lambda local: np.broadcast_to(mean, local.shape)
 
@@ -132,7 +133,8 @@ def _plane_lookup(model: mujoco.MjModel, geom: int, image: np.ndarray) -> _Looku
     return lookup
 
 
-def _mesh_lookup(model: mujoco.MjModel, mesh: int, image: np.ndarray) -> _Lookup:
+def _mesh_lookup(model: mujoco.MjModel, geom: int, image: np.ndarray) -> _Lookup:
+    mesh, repeat = int(model.geom_dataid[geom]), model.mat_texrepeat[model.geom_matid[geom]]
     faces = _rows(model.mesh_face, model.mesh_faceadr, model.mesh_facenum, mesh)
     uv_faces = _rows(model.mesh_facetexcoord, model.mesh_faceadr, model.mesh_facenum, mesh)
     vertices = _rows(model.mesh_vert, model.mesh_vertadr, model.mesh_vertnum, mesh)
@@ -148,7 +150,7 @@ def _mesh_lookup(model: mujoco.MjModel, mesh: int, image: np.ndarray) -> _Lookup
     root, other = np.sqrt(rng.random(_SAMPLES_PER_MESH)), rng.random(_SAMPLES_PER_MESH)
     weights = np.stack([1 - root, root * (1 - other), root * other], axis=-1)[..., None]
     tree = cKDTree((corners[chosen] * weights).sum(axis=1))
-    colours = _texels(image, (uv[uv_faces[chosen]] * weights).sum(axis=1))
+    colours = _texels(image, (uv[uv_faces[chosen]] * weights).sum(axis=1) * repeat)
     return lambda local: colours[tree.query(local)[1]]
 
 

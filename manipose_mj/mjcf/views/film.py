@@ -72,13 +72,17 @@ def encode_animation(
       format: "webp" is the smallest; "gif" has 256 colours; "png" is lossless.
 
     Raises:
-      InputError: No frame, sizes differ, no such format, or a rate that is not positive.
+      InputError: No frame, sizes differ, no such format, or a rate that browsers do not show.
     """
     _common_size(frames)
     if format not in FORMATS:
         raise InputError(f"animation format {format!r}; expected one of {', '.join(FORMATS)}")
-    if not fps > 0:
-        raise InputError(f"{fps} frames per second; expected a positive rate")
+    # A frame lasts whole milliseconds, in a GIF hundredths of a second; browsers slow down those of one.
+    most = 50.0 if format == "gif" else 1000.0
+    if not 0 < fps <= most:
+        raise InputError(
+            f"{fps:g} frames per second; expected more than 0, in {format} at most {most:g}"
+        )
     images = [Image.fromarray(frame) for frame in frames]
     if format == "gif":
         # One palette for all frames keeps still parts from flickering.
@@ -106,7 +110,7 @@ def _common_size(pictures: Sequence[np.ndarray]) -> tuple[int, int]:
     if not len(pictures):
         raise InputError("no picture given; expected at least one")
     sizes = sorted({tuple(picture.shape) for picture in pictures})
-    if len(sizes) > 1 or len(sizes[0]) != 3 or sizes[0][2] != 3:
+    if len(sizes) > 1 or len(sizes[0]) != 3 or sizes[0][2] != 3 or 0 in sizes[0]:
         raise InputError(f"pictures of shapes {sizes}; expected one shape (height, width, 3)")
     return sizes[0][0], sizes[0][1]
 

@@ -33,6 +33,7 @@ _FIELDS = (
     "actuator_gainprm",
     "actuator_biasprm",
 )
+_DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,9 @@ class Randomiser:
             for entity in objects
         ]
         self._keeps = np.isin(np.arange(model.ngeom), fixed_friction)
+        # MuJoCo gives a geom its material's colour as long as its own is the default.
+        plain = (self._nominal["geom_rgba"] == _DEFAULT_RGBA).all(axis=1)
+        self._by_material = plain & (np.array(model.geom_matid) >= 0)
 
     def draw(self, random_state: np.random.RandomState) -> ModelChanges:
         """Another world; none is drawn, and nothing changed, at the strength `none`."""
@@ -163,6 +167,8 @@ class Randomiser:
         for name in ("geom_rgba", "mat_rgba"):
             colours = fields[name]
             noise = random_state.normal(0, strength.colour, (len(colours), 3))
+            if name == "geom_rgba":
+                noise[self._by_material] = 0.0
             colours[:, :3] = np.clip(colours[:, :3] + noise, 0.0, 1.0)
         shift("cam_pos", strength.camera_shift)
         for quaternion in fields["cam_quat"]:

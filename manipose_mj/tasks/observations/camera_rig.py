@@ -48,6 +48,7 @@ class Frame:
       pose: `T_world_camera` as calibration states it, OpenCV's axes.
       rays: `(height * width, 3)`, of each pixel in the world's axes, likewise; times the depth it is the way
         from the camera to the point.
+      misread: `(3, 3)`, by how much calibration turns what is there; None where it is right.
     """
 
     depth: Float[np.ndarray, "height width"]
@@ -56,6 +57,7 @@ class Frame:
     intrinsics: Intrinsics
     pose: Float[np.ndarray, "4 4"]
     rays: Float[np.ndarray, "pixels 3"]
+    misread: Float[np.ndarray, "3 3"] | None = None
 
     @property
     def ideal(self) -> bool:
@@ -187,9 +189,10 @@ class CameraRig:
         instance = np.maximum(pixel_instances(exact.geom_id, self._owners), 0)
         pose, intrinsics = self.pose(physics, camera), self.intrinsics(physics, camera)
         rays = self._world_rays(camera, pose[:3, :3], intrinsics)
+        misread = self._misread(physics, camera, pose)
         sensor = self._config.depth_sensor
         if sensor is None:
-            return Frame(exact.depth, instance, exact, intrinsics, pose, rays)
+            return Frame(exact.depth, instance, exact, intrinsics, pose, rays, misread)
         true = self._true_rays(physics, camera, intrinsics)
         towards = -np.einsum("ni,ni->n", exact.normal.reshape(-1, 3), true)
         cosine = (towards / np.linalg.norm(true, axis=1)).reshape(exact.depth.shape)
@@ -197,7 +200,15 @@ class CameraRig:
         rng = np.random.default_rng((self._seed, step_number(physics), number))
         noisy = measure(exact.depth.astype(float), cosine, intrinsics, rng, sensor)
         depth = noisy.depth.astype(np.float32)
-        return Frame(depth, noisy.moved(instance), exact, intrinsics, pose, rays)
+        return Frame(depth, noisy.moved(instance), exact, intrinsics, pose, rays, misread)
+
+    def _misread(
+        self, physics: mjcf.Physics, camera: str, stated: Float[np.ndarray, "4 4"]
+    ) -> Float[np.ndarray, "3 3"] | None:
+        if not self._config.camera_error:
+            return None
+        true = camera_pose(physics.model.ptr, physics.data.ptr, camera)
+        return stated[:3, :3] @ true[:3, :3].T
 
     def _true_rays(
         self, physics: mjcf.Physics, camera: str, intrinsics: Intrinsics

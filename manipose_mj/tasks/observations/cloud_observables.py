@@ -139,9 +139,10 @@ class _Pixels:
 
 
 def _normals(frame: Frame, chosen: _Pixels) -> Float[np.ndarray, "n 3"]:
-    """World normals: exact from an ideal sensor, else as the noisy depth of each instance has them."""
+    """World normals, turned as calibration is: exact from an ideal sensor, else of each instance's noisy depth."""
     if frame.ideal:
-        return frame.exact.normal.reshape(-1, 3)[chosen.pixel]
+        exact = frame.exact.normal.reshape(-1, 3)[chosen.pixel]
+        return exact if frame.misread is None else rotated(exact, frame.misread).astype(np.float32)
     normals = np.zeros((len(chosen.pixel), 3))
     for instance in np.unique(chosen.instance):
         own = np.flatnonzero(chosen.instance == instance)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from jaxtyping import Float
@@ -29,8 +30,8 @@ class FixedError:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not 0 <= value < np.inf:
-                raise InputError(f"error: {name} is {value}; expected 0 or more")
+            if not isinstance(value, Real) or not 0 <= value < np.inf:
+                raise InputError(f"error: {name} is {value!r}; expected 0 or more")
 
     def __bool__(self) -> bool:
         return bool(self.translation > 0 or self.rotation > 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ class CameraView:
     fovy: float = 45.0
 
     def __post_init__(self) -> None:
-        if not self.name or not self.name.replace("_", "").isalnum():
+        word = self.name.replace("_", "") if isinstance(self.name, str) else ""
+        if not word.isalnum():
             raise InputError(f"camera name {self.name!r}: expected letters, digits and underscores")
         for field in ("position", "target"):
             object.__setattr__(self, field, _numbers(getattr(self, field)))
@@ -45,8 +47,8 @@ class CameraView:
                 f"camera {self.name!r}: position {self.position} and target {self.target}; "
                 "expected two different points of three finite coordinates"
             )
-        if not 0 < self.fovy < 180:
-            raise InputError(f"camera {self.name!r}: fovy {self.fovy} deg; expected 0 to 180")
+        if not isinstance(self.fovy, Real) or not 0 < self.fovy < 180:
+            raise InputError(f"camera {self.name!r}: fovy {self.fovy!r} deg; expected 0 to 180")
 
 
 def _numbers(point: Any) -> tuple[float, ...]:
@@ -71,8 +73,8 @@ class PoseNoise:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not 0 <= value < np.inf:
-                raise InputError(f"pose noise: {name} is {value}; expected 0 or more")
+            if not isinstance(value, Real) or not 0 <= value < np.inf:
+                raise InputError(f"pose noise: {name} is {value!r}; expected 0 or more")
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,7 @@ class SensorConfig:
                 raise InputError(f"sensors: {name} is {getattr(self, name)!r}; expected {expected}")
         if isinstance(self.cameras, str) or not isinstance(self.cameras, Sequence):
             raise InputError(f"sensors: cameras is {self.cameras!r}; expected a tuple of cameras")
+        object.__setattr__(self, "cameras", tuple(self.cameras))
         names = self.camera_names
         for name in names:
             if names.count(name) > 1:

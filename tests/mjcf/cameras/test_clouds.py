@@ -151,3 +151,13 @@ def test_bad_input(scene):
             camera_intrinsics(model, "a", 4, 5),
             camera_pose(model, data, "a"),
         )
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+@pytest.mark.parametrize("name", ["normal", "colour"])
+def test_images_of_another_size_are_refused(scene, name):
+    model, data = scene
+    image = np.zeros((8, 10, 3), np.uint8 if name == "colour" else float)
+    sight, pose = camera_intrinsics(model, "a", 4, 5), camera_pose(model, data, "a")
+    with pytest.raises(InputError, match=rf"{name} image is \(8, 10\)"):
+        cloud_from_depth(np.ones((4, 5)), np.zeros((4, 5), int), sight, pose, **{name: image})

@@ -246,8 +246,11 @@ def test_bad_film():
         encode_animation([frame, frame[:3]])
     with pytest.raises(InputError, match="format 'avi'"):
         encode_animation([frame], format="avi")
-    with pytest.raises(InputError, match="positive rate"):
-        encode_animation([frame], fps=0)
+    for fps, kind in ((0, "webp"), (float("inf"), "png"), (60, "gif")):
+        with pytest.raises(InputError, match=f"more than 0, in {kind} at most"):
+            encode_animation([frame], fps=fps, format=kind)
+    with pytest.raises(InputError, match="pictures of shapes"):
+        encode_animation([frame[:0]])
 
 
 def test_speed(scene):

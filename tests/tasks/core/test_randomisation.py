@@ -7,6 +7,7 @@ import pytest
 
 from manipose_mj import suite
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.cameras.ray_casting import geom_colours
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.tasks.core.randomisation import STRENGTHS, Delay
 from manipose_mj.tasks.core.snapshot import restore, save
@@ -76,6 +77,20 @@ def test_all_that_is_named_changes_within_its_strength(environments, name):
         assert ratios.max() > 1 + 0.5 * (most - 1), field  # all of the range is used
     shift = np.stack([s["cam_pos"] - nominal["cam_pos"] for s in seen])
     assert 0.6 * strength.camera_shift < shift.std() < 1.4 * strength.camera_shift
+
+
+def test_colours_change_by_what_is_named_where_materials_give_them(environments):
+    nominal = geom_colours(environments["none"].physics.model.ptr)
+    environment, changes = environments["strong"], []
+    by_material = np.array(environment.physics.model.geom_matid) >= 0
+    for seed in range(6):
+        environment.random_state.seed(seed)
+        environment.reset()
+        changes.append(geom_colours(environment.physics.model.ptr) - nominal)
+    changed = np.stack(changes)[:, by_material, :3]
+    assert by_material.sum() > 20
+    assert np.abs(changed).max() > 0 and abs(changed.mean()) < 0.05
+    assert changed.std() < 1.2 * STRENGTHS["strong"].colour
 
 
 def test_finger_pads_keep_their_friction(environments):

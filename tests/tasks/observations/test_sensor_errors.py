@@ -72,8 +72,11 @@ def test_a_wrong_calibration_moves_clouds_and_leaves_images():
     assert np.linalg.norm(error[:3, 3]) == pytest.approx(0.02)
     # Cameras follow one another in a cloud: the first points are the first camera's.
     own = slice(0, 200)
-    moved = transform(stated @ invert(plain["camera/left/pose"]), plain["pointcloud/points"][own])
+    change = stated @ invert(plain["camera/left/pose"])
+    moved = transform(change, plain["pointcloud/points"][own])
     np.testing.assert_allclose(seen["pointcloud/points"][own], moved, atol=1e-5)
+    turned = plain["pointcloud/normals"][own] @ change[:3, :3].T
+    np.testing.assert_allclose(seen["pointcloud/normals"][own], turned, atol=1e-5)
     np.testing.assert_array_equal(seen["pointcloud/colours"][own], plain["pointcloud/colours"][own])
 
 
