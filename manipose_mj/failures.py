@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-STAGES = ("perception", "grasp", "plan", "motion", "release", "timeout", "physics", "policy")
+STAGES = (
+    "perception",
+    "grasp",
+    "plan",
+    "motion",
+    "release",
+    "timeout",
+    "physics",
+    "policy",
+    "error",
+)
 
 
 class StageFailure(Exception):

@@ -92,6 +92,11 @@ def _factory(name: str, said_by: str) -> Callable[..., Any]:
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
         raise InputError(f"{said_by}: expected package.module:Factory or ws://host:port")
+    if "/" in module_name or "\\" in module_name or module_name.endswith(".py"):
+        word = module_name.removesuffix(".py").replace("\\", "/").strip("./").replace("/", ".")
+        raise InputError(
+            f"{said_by}: a file's path; expected a module's name, such as {word}:{attribute}"
+        )
     search_working_folder()
     found: Any = import_user_module(module_name, said_by)
     for part in attribute.split("."):

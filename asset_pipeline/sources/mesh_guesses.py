@@ -62,7 +62,7 @@ def guess_unit(longest: float, category: str) -> str:
     sizes = ", ".join(f"{UNITS[u] * longest:.3g} m in {u}" for u in (*GUESSED_UNITS, RARE_UNIT))
     what = category if category in CATALOGUE else "tabletop object"
     raise InputError(
-        f"the longest side is {longest:.4g}: {sizes}; a {what} has {low:g} to {high:g} m; "
+        f"the longest side is {longest:.4g}: {sizes}; a {what} has {low / SLACK:g} to {high * SLACK:g} m; "
         "say --unit, also as a number of metres"
     )
 

@@ -108,6 +108,7 @@ class Worlds:
         """
         self._require_open()
         check_count("hold", hold, least=1)
+        action = action if hasattr(action, "shape") else np.asarray(action)
         self.check_actions(action)
         return self._step_jit(state, action, hold)
 

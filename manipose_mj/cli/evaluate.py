@@ -202,7 +202,8 @@ def run_and_report(config, *, resume: bool) -> int:
     for line in common_reasons(results, config.out):
         console.print(line, soft_wrap=True)
     console.print(f"report: {report}", soft_wrap=True)
-    return 0
+    # Where nothing could be played, nothing was found out.
+    return int(all(result.failure == "error" for result in results))
 
 
 def common_reasons(results: Sequence[EpisodeResult], out: Path) -> list[str]:

@@ -33,6 +33,7 @@ from manipose_mj.policies.loading import load_policy
 from manipose_mj.policies.protocol import ActionSpace, Policy, PolicyRaisedError
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
+from manipose_mj.wire.client import RemoteFailureError
 
 _RECORD_EVERY = 5  # control steps
 BY_RULES = PlannerSettings()
@@ -195,8 +196,10 @@ def play(
 
 
 def _raised(failure: StageFailure | None) -> str:
-    """The traceback of what an estimator raised, where that ended the episode."""
+    """The traceback of what an estimator or a server raised, where that ended the episode."""
     failed = None if failure is None else failure.__cause__
+    if isinstance(failed, RemoteFailureError):
+        return failed.text
     if not isinstance(failed, EstimatorFailedError) or failed.__cause__ is None:
         return ""
     return "".join(traceback.format_exception(failed.__cause__))
@@ -223,7 +226,8 @@ def _result(
     diverged = failure is not None and failure.stage == "physics"
     success = task.succeeded(physics) and not diverged
     if failure is None and not success:
-        failure = StageFailure("release", "the goal is not met though the plan was carried out")
+        ended = "the policy said it was done" if estimates is None else "the plan was carried out"
+        failure = StageFailure("release", f"the goal is not met though {ended}")
     if failure is not None and not success and estimates is not None:
         failure = estimates.cause(failure)
     error = None if diverged else task.goal_error(physics)

@@ -13,6 +13,8 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dm_control.rl.control import PhysicsError
+
 from manipose_mj.console.cluster import cluster
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, worker_deaths
@@ -283,7 +285,7 @@ def _independent_of_folder(config: EvaluationConfig) -> EvaluationConfig:
 
 
 def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -> EpisodeResult:
-    """Run an episode and save its trajectory; a crash of the simulation is a failed episode.
+    """Run an episode and save its trajectory; what raises is a failed episode.
 
     Raises:
       InputError: The episode's input is wrong, or its trajectory cannot be written.
@@ -324,6 +326,7 @@ def _crashed(
     config: EvaluationConfig, task: str, episode: int, error: Exception, wall_s: float
 ) -> EpisodeResult:
     of_policy = isinstance(error, PolicyRaisedError)
+    stage = "policy" if of_policy else "physics" if isinstance(error, PhysicsError) else "error"
     reason = " ".join((str(error) if of_policy else f"{type(error).__name__}: {error}").split())
     return EpisodeResult(
         task=task,
@@ -334,7 +337,7 @@ def _crashed(
         mask_source=config.mask_source,
         success_once=False,
         success_at_end=False,
-        failure="policy" if of_policy else "physics",
+        failure=stage,
         reason=storable(reason[:300]),
         translation_error=None,
         rotation_error=None,

@@ -4,19 +4,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from manipose_mj.tasks.core.registry import TaskSpec, on_registration
-
-NAMESPACE = "manipose_mj"
-
-
-def env_id(name: str) -> str:
-    """`manipose_mj/StoreChipsCanMiddleDrawer-v0` for `articulated/store_chips_can_middle_drawer`.
-
-    Args:
-      name: Of a task, with or without its domain.
-    """
-    words = name.rpartition("/")[2].split("_")
-    return f"{NAMESPACE}/{''.join(word[:1].upper() + word[1:] for word in words)}-v0"
+from manipose_mj.tasks.core.registry import TaskSpec, env_id, on_registration
 
 
 def register_envs() -> None:
@@ -27,11 +15,7 @@ def register_envs() -> None:
 def _register(spec: TaskSpec) -> None:
     identifier = env_id(spec.name)
     if identifier in gymnasium.registry:
-        taken = gymnasium.registry[identifier].kwargs.get("task")
-        raise ValueError(
-            f"task {spec.full_name} would have the Gymnasium id {identifier}, which is {taken}'s; "
-            "choose another name"
-        )
+        raise ValueError(f"task {spec.full_name}: Gymnasium knows an id {identifier} already")
     # Entry points as text: making or listing environments loads no more than it must.
     gymnasium.register(
         identifier,

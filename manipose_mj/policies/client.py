@@ -118,7 +118,7 @@ class RemotePolicy:
     def _refuse(self, error: RemoteFailureError) -> NoReturn:
         """Fail the episode; servers hang up after an error."""
         self.close()
-        raise StageFailure("policy", str(error)) from None
+        raise StageFailure("policy", str(error)) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         return RemotePolicy, (self.address,)

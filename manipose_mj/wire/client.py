@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
@@ -17,6 +18,10 @@ SCHEMES = ("ws://", "wss://")
 _OPEN_S = 10.0
 # The first answer of a server may wait minutes for a compiler.
 _ANSWER_S = 900.0
+
+
+# How Python begins the last part of a traceback.
+_ERROR = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Failure): ")
 
 
 class RemoteFailureError(RuntimeError):
@@ -94,8 +99,7 @@ class Client:
         except (OSError, EOFError, WebSocketException) as error:
             raise self._gone(f"connection lost: {_reason(error)}") from None
         if isinstance(answer, str):  # how openpi's servers report an exception
-            last = (answer.strip().splitlines() or ["no reason given"])[-1]
-            raise RemoteFailureError(f"the server failed: {last[:200]}", answer)
+            raise RemoteFailureError(f"the server failed: {_last_error(answer)[:200]}", answer)
         try:
             return unpack(answer)
         except ValueError as error:
@@ -145,3 +149,10 @@ def _reason(error: Exception) -> str:
 
 def _text(name: Any) -> str:
     return name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+
+
+def _last_error(text: str) -> str:
+    """What a traceback ends with, from the type of the error on, in one line; the last line of other texts."""
+    lines = text.strip().splitlines() or ["no reason given"]
+    named = [row for row, line in enumerate(lines) if _ERROR.match(line)]
+    return " ".join(" ".join(lines[named[-1] if named else -1 :]).split())

@@ -193,6 +193,7 @@ def test_evaluate_writes_everything_and_resumes(tmp_path: Path, capsys) -> None:
     assert main(argv) == 0
     shown = capsys.readouterr()
     assert str(out / "report.html") in shown.out and fake.TASKS[0] in shown.out
+    assert "failed in error" not in shown.out
     summary = json.loads((out / "summary.json").read_text())
     assert set(summary["tasks"]) == set(fake.TASKS)
     assert {
@@ -212,6 +213,17 @@ def test_evaluate_writes_everything_and_resumes(tmp_path: Path, capsys) -> None:
     (out / "results.jsonl").write_bytes(b"".join(lines[:4]) + lines[4][:10])
     assert main([*argv, "--resume"]) == 0
     assert len(read_results(out / "results.jsonl")[0]) == 6
+
+
+@pytest.mark.usefixtures("fake_episodes")
+def test_an_evaluation_in_which_nothing_could_be_played_fails(tmp_path, capsys, monkeypatch):
+    def broken(config, spec, **options):
+        raise KeyError("objekt")
+
+    monkeypatch.setattr("manipose_mj.evaluation.episode.run_episode", broken)
+    argv = ["evaluate", fake.TASKS[0], "--episodes", "2", "--jobs", "1"]
+    assert main([*argv, "--out", str(tmp_path / "out")]) == 1
+    assert "failed in error, 2 of 2: KeyError: 'objekt'" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("fake_episodes")

@@ -17,9 +17,12 @@ TASKS = ("single_object/target_pose", "articulated/store_chips_can_middle_drawer
 
 
 def make_runner(seconds: float = 0.0, diary: Path | None = None):
-    """A runner whose outcome follows from the seed alone; local, so that it pickles by value."""
+    """A runner whose outcome follows from the seed alone; local, so that it pickles by value.
 
-    def run(config, spec, *, episode, pose, estimator=None):
+    It takes what `run_episode` takes, and heeds the first few.
+    """
+
+    def run(config, spec, *, episode, pose, estimator=None, planner=None, errors=None, grasps=None):
         task, seed = config.task, spec.seed
         start = time.perf_counter()
         rng = np.random.default_rng(seed)

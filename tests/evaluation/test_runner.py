@@ -245,7 +245,7 @@ def test_a_crash_is_one_failed_episode(tmp_path: Path) -> None:
     results = evaluate(config(tmp_path), runner=crashing)
     crashed = [r for r in results if r.episode == 2]
     assert {(r.failure, r.reason) for r in crashed} == {
-        ("physics", "FloatingPointError: qacc is not finite")
+        ("error", "FloatingPointError: qacc is not finite")
     }
     assert len(list(tmp_path.rglob("00002.error.txt"))) == 2
 
@@ -280,9 +280,7 @@ def test_a_number_that_is_not_finite_costs_one_episode(tmp_path: Path) -> None:
         return result, trajectory
 
     results = evaluate(config(tmp_path, episodes=2), runner=infinite)
-    assert [r.failure == "physics" and r.steps == 0 for r in results if r.episode == 0] == [
-        True
-    ] * 2
+    assert [r.failure == "error" and r.steps == 0 for r in results if r.episode == 0] == [True] * 2
 
 
 def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path: Path) -> None:

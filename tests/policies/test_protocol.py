@@ -75,6 +75,11 @@ def test_policies_are_loaded_by_name_once():
     ("name", "arguments", "said"),
     [
         ("policy", None, "expected package.module:Factory or ws://host:port"),
+        (
+            "./own/policy.py:Make",
+            None,
+            "a file.s path; expected a module.s name, such as own.policy:Make",
+        ),
         ("no.such.module:Factory", None, "cannot import no.such.module"),
         (f"{HERE}:Reachign", None, "unknown attribute .* 'Reachign'; did you mean Reaching"),
         (f"{HERE}:np.pi", None, "cannot be called"),

@@ -132,6 +132,7 @@ def test_an_error_of_the_server_is_a_failure_and_the_next_episode_connects_anew(
             with pytest.raises(StageFailure, match="KeyError: 'weights'") as caught:
                 remote.infer(OBSERVATION)
             assert caught.value.stage == "policy"
+            assert "Traceback" in caught.value.__cause__.text
 
 
 def test_a_server_that_goes_away_is_lost():

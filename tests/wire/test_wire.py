@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manipose_mj.errors import InputError, ServerLostError
-from manipose_mj.wire.client import Client, RemoteFailureError, is_address
+from manipose_mj.wire.client import Client, RemoteFailureError, _last_error, is_address
 from manipose_mj.wire.framing import pack, unpack
 from tests.wire.answering import answering
 
@@ -112,3 +112,16 @@ def test_a_server_that_says_nothing_in_time_is_lost():
         client = Client(address, answer_s=0.05)
         with pytest.raises(ServerLostError, match=r"no answer within 0\.05 s"):
             client.ask({})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Traceback:\n  File x\nRuntimeError: boom\nsecond line", "RuntimeError: boom second line"),
+        ("Traceback:\n  a.b.OwnError: inner\nKeyError: 'x'", "KeyError: 'x'"),
+        ("it broke\nbadly", "badly"),
+        ("", "no reason given"),
+    ],
+)
+def test_of_a_servers_traceback_the_whole_error_is_told(text, said):
+    assert _last_error(text) == said

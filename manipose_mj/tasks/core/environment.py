@@ -16,6 +16,7 @@ from dm_control import composer
 from dm_control.composer.environment import HOOK_NAMES
 from dm_control.rl.control import PhysicsError
 
+from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.core.scene_objects import SceneObjects
 from manipose_mj.tasks.core.scene_source import SceneSource
@@ -103,6 +104,7 @@ class TaskEnvironment(composer.Environment):
           InputError: What `spec` asks for cannot be.
           PhysicsError: None of a few starts came to rest.
         """
+        self._require_open()
         spec = spec or EpisodeSpec()
         self._reset_next_step = True  # where this fails, the next step begins an episode
         if spec.seed is not None:
@@ -186,6 +188,7 @@ class TaskEnvironment(composer.Environment):
           observe: Whether somebody looks; else the observation is the last one that somebody looked at, and no
             picture is drawn.
         """
+        self._require_open()
         if observe or self._reset_next_step:
             return self._stepped(action)
         looking = self._observation_updater
@@ -227,6 +230,10 @@ class TaskEnvironment(composer.Environment):
             self._kept.clear()
             self.task.close()
             super().close()
+
+    def _require_open(self) -> None:
+        if self._physics is None:
+            raise InputError("the environment was closed: make another one")
 
     def go_on(self, observation: Any, failure: str, failure_reason: str) -> None:
         """What a restored episode has been so far: last seen, and how it failed."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import importlib
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -66,6 +67,8 @@ def _registered(module: str, domain: str, name: str) -> TaskSpec:
     return task_spec(domain, name)
 
 
+GYM_NAMESPACE = "manipose_mj"
+_WORDS = re.compile(r"[a-z0-9]+(_[a-z0-9]+)*")
 _TASKS: dict[tuple[str, str], TaskSpec] = {}
 _listeners: list[Callable[[TaskSpec], None]] = []
 
@@ -87,8 +90,8 @@ def register_task(
     that imports the module of the factory.
 
     Args:
-      domain: The family.
-      name: Lower case words joined by `_`, of which the Gymnasium id is made.
+      domain: The family: lower case words joined by `_`.
+      name: Likewise; the Gymnasium id is made of it alone.
       tags: For `dm_control.suite`'s subsets.
       draws: Where the objects differ from episode to episode: makes, for an environment, what draws them.
         The factory then takes those that were drawn as a second argument, `objects`.
@@ -97,12 +100,11 @@ def register_task(
     to the task's card.
 
     Raises:
-      ValueError: The name is taken, or the factory has no docstring.
+      ValueError: The name is none or taken, or the factory has no docstring.
     """
 
     def decorate(factory: FactoryT) -> FactoryT:
-        if (domain, name) in _TASKS:
-            raise ValueError(f"task {domain}/{name} is registered already")
+        _check_name(domain, name)
         if not factory.__doc__:
             raise ValueError(f"the factory of {domain}/{name} needs a docstring")
         summary = factory.__doc__.strip().splitlines()[0]
@@ -113,6 +115,33 @@ def register_task(
         return factory
 
     return decorate
+
+
+def env_id(name: str) -> str:
+    """`manipose_mj/StoreChipsCanMiddleDrawer-v0`, the Gymnasium id of `articulated/store_chips_can_middle_drawer`.
+
+    Args:
+      name: Of a task, with or without its domain.
+    """
+    words = name.rpartition("/")[2].split("_")
+    return f"{GYM_NAMESPACE}/{''.join(word[:1].upper() + word[1:] for word in words)}-v0"
+
+
+def _check_name(domain: str, name: str) -> None:
+    """Raise `ValueError` for a task that no front door could tell from the others."""
+    if (domain, name) in _TASKS:
+        raise ValueError(f"task {domain}/{name} is registered already")
+    for what, word in (("domain", domain), ("name", name)):
+        if not _WORDS.fullmatch(word):
+            raise ValueError(
+                f"task {domain}/{name}: the {what} is {word!r}; expected lower case words joined by _"
+            )
+    for known in _TASKS.values():
+        if env_id(known.name) == env_id(name):
+            raise ValueError(
+                f"task {domain}/{name} would have the Gymnasium id {env_id(name)}, which is {known.full_name}'s; "
+                "choose another name"
+            )
 
 
 def on_registration(listener: Callable[[TaskSpec], None]) -> None:

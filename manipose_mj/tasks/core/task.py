@@ -24,7 +24,7 @@ from manipose_mj.tasks.core.own_goal import with_goal
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.randomisation import Delay, Randomiser, randomisation, write_changes
 from manipose_mj.tasks.core.scene import Scene
-from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start import EpisodeStart, check_start
 from manipose_mj.tasks.goals import Goal, PoseGoal, reward, success
 from manipose_mj.tasks.observations.frames import BodyFrame
 from manipose_mj.tasks.observations.sensors import SensorObservables, Slots
@@ -50,6 +50,7 @@ class ManipulationTask(composer.Task):
       control_mode: What actions mean.
       spec: What the episode that begins next shall be.
       start: How this episode started; None before the first.
+      random: The environment's random state, for wrappers of dm_control: what they draw, no episode draws.
       success_now: Whether the goals were met after the last control step.
       success_once: Whether they were after any of this episode.
       max_penetration: Deepest contact of this episode [m].
@@ -73,6 +74,7 @@ class ManipulationTask(composer.Task):
         self._state: SceneState  # after the last control step
         self._action_shape = self.control_mode.spec().shape
         self._physics: mjcf.Physics | None = None
+        self.random: np.random.RandomState | None = None
         self._randomiser: Randomiser | None = None
         self._delay = Delay()
         self._target = np.zeros(8)
@@ -199,6 +201,7 @@ class ManipulationTask(composer.Task):
         changes = replace(changes, latency=changes.latency + self.env_config.latency)
         self._preview.change(changes)
         start = self.sample(rng, spec, self._preview)
+        check_start(start, len(self.scene.rigid_objects), len(self.scene.articulated_objects))
         if spec.goal is not None:
             asked = [
                 name
@@ -314,7 +317,7 @@ class ManipulationTask(composer.Task):
         return self.control_mode.spec()
 
     def after_compile(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        self._physics = physics
+        self._physics, self.random = physics, random_state
         # Now, for episodes change the model.
         self._randomiser = self._make_randomiser(physics)
         self._preview = Preview(physics, self.scene)

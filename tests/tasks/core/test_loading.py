@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from dm_control import suite as dm_suite
+from dm_control.suite.wrappers import action_noise
 
 import manipose_mj
 from manipose_mj import suite
@@ -116,6 +117,24 @@ def test_dm_control_loads_the_same_episodes(task):
         assert step.observation.keys() == own.observation.keys()
         assert all(np.array_equal(step.observation[k], v) for k, v in own.observation.items())
         assert theirs.step(HOLD).reward in (0.0, 1.0)
+
+
+def test_wrappers_of_dm_control_draw_from_a_tasks_random_state():
+    environment = load(*TARGET_POSE, seed=7)
+    noisy = action_noise.Wrapper(environment, 0.01)
+    noisy.reset()
+    assert np.isfinite(noisy.step(HOLD).reward)
+    assert noisy.task.random is environment.random_state
+
+
+def test_a_closed_environment_says_so():
+    environment = load(*TARGET_POSE, seed=7)
+    environment.reset()
+    environment.close()
+    environment.close()
+    for use in (environment.reset, lambda: environment.step(HOLD)):
+        with pytest.raises(InputError, match="was closed: make another"):
+            use()
 
 
 @pytest.mark.parametrize(

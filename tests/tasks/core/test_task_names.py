@@ -7,7 +7,7 @@ import pytest
 from manipose_mj import suite
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.core.registry import tasks_named
+from manipose_mj.tasks.core.registry import register_task, tasks_named
 
 TASK = "single_object/target_pose"
 
@@ -40,3 +40,19 @@ def test_evaluate_takes_patterns(monkeypatch, tmp_path, capsys):
     assert (
         capsys.readouterr().err == "manipose: no task fits 'cluter/*'; `manipose list` names them\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("domain", "name", "said"),
+    [
+        ("mine", "target_pose", "which is single_object/target_pose's"),
+        ("mine", "pick up", "the name is 'pick up'; expected lower case words"),
+        ("mine/x", "slashed", "the domain is 'mine/x'; expected lower case words"),
+        ("single_object", "target_pose", "registered already"),
+    ],
+)
+def test_names_that_a_front_door_cannot_tell_apart_are_refused(domain, name, said):
+    before = suite.ALL_TASKS
+    with pytest.raises(ValueError, match=said):
+        register_task(domain, name)(lambda env_config: None)
+    assert before == suite.ALL_TASKS
