@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
+
+_NUMBERS = (int, float, np.integer, np.floating)
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class FixedError:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not isinstance(value, Real) or not 0 <= value < np.inf:
+            if not isinstance(value, _NUMBERS) or not 0 <= value < np.inf:
                 raise InputError(f"error: {name} is {value!r}; expected 0 or more")
 
     def __bool__(self) -> bool:
