@@ -146,9 +146,12 @@ def estimate_rows(
     """
     if len(clouds) == 0:
         return []
-    upwards = np.asarray(up, np.float32)
+    try:
+        upwards = np.asarray(up, np.float32)
+    except (TypeError, ValueError):
+        upwards = np.zeros(0)
     if upwards.shape != (3,) or not np.isfinite(upwards).all() or not upwards.any():
-        raise InputError(f"up is {up}; expected a direction, three numbers not all zero")
+        raise InputError(f"up is {up!r}; expected a direction, three numbers not all zero")
     seeds_of(key)
     checked = []
     for number, cloud in enumerate(clouds):

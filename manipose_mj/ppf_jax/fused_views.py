@@ -24,7 +24,14 @@ from manipose_mj.ppf_jax.estimator import (
     filled,
     scores_found,
 )
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
+from manipose_mj.ppf_jax.points.camera_frames import checked_frames
+from manipose_mj.ppf_jax.points.cloud_input import (
+    AnyCloud,
+    checked_cloud,
+    cloud_arrays,
+    distinct_rows,
+    seeds_of,
+)
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
@@ -118,7 +125,7 @@ class FusedViewEstimator:
         """The pose of the object that a cloud of several cameras shows, in its frame.
 
         Raises:
-          InputError: The networks have learnt from single cameras.
+          InputError: The networks have learnt from single cameras, or the cloud cannot be used.
         """
         return self.networks.as_estimate(self._found(cloud, key=key))
 
@@ -137,12 +144,12 @@ class FusedViewEstimator:
                 "PoseEstimator.load(name, cameras='several')"
             )
         rng = np.random.default_rng(seeds_of(key))
-        rows = rng.permutation(len(cloud.points))[: model.config.sample]
-        points, mask = filled(cloud.points[rows], model.config.sample)
-        origins = np.zeros_like(cloud.points) if cloud.eyes is None else cloud.eyes
-        eyes, _ = filled(origins[rows], model.config.sample)
+        checked = _checked(cloud)
+        rows = rng.permutation(len(checked.points))[: model.config.sample]
+        points, mask = filled(checked.points[rows], model.config.sample)
+        eyes, _ = filled(checked.eyes[rows], model.config.sample)
         first = rows[: model.config.points]
-        normals, _ = filled(cloud.normals[first], model.config.points)
+        normals, _ = filled(checked.normals[first], model.config.points)
         return _estimate_sample(model, points, normals, mask, key=key, eyes=eyes)
 
 
@@ -162,24 +169,19 @@ def fused_cloud(
     Returns:
       The cloud, and its frame in the common one.
     """
-    frames = np.asarray(T_common_camera, float)
-    if frames.shape != (len(clouds), 4, 4):
-        raise InputError(
-            f"{len(clouds)} clouds and camera frames of shape {frames.shape}; expected a 4x4 frame each"
-        )
-    for number, frame in enumerate(frames):
-        if not _is_rigid(frame):
-            raise InputError(f"camera frame {number} is no rigid transform")
+    frames = checked_frames(T_common_camera, len(clouds))
     seen = []
-    for cloud, frame in zip(clouds, frames, strict=True):
-        points = np.asarray(getattr(cloud, "points", cloud), float)
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise InputError(f"a cloud has shape {points.shape}; expected (n, 3)")
-        if len(points) < MIN_VIEW_POINTS:
-            continue
-        points, normals = checked_cloud(
-            cloud, fewest=MIN_VIEW_POINTS, shortest=0.0, longest=LONGEST, what="an object"
-        )
+    for number, (cloud, frame) in enumerate(zip(clouds, frames, strict=True)):
+        try:
+            if distinct_rows(cloud_arrays(cloud)[0]).sum() < MIN_VIEW_POINTS:
+                continue
+            points, normals = checked_cloud(
+                cloud, fewest=MIN_VIEW_POINTS, shortest=0.0, longest=LONGEST, what="an object"
+            )
+        except InputError as error:
+            raise InputError(
+                f"cloud {number}: {error}" if len(clouds) > 1 else str(error)
+            ) from None
         kept = rng.permutation(len(points))[:VIEW_POINTS]
         normals = cloud_normals(points, kept) if normals is None else normals[kept]
         seen.append((points[kept], _towards(points[kept], normals), frame))
@@ -197,6 +199,26 @@ def fused_cloud(
     return FusedCloud(*rows), main
 
 
+def _checked(cloud: FusedCloud | LabelledCloud) -> FusedCloud:
+    """The cloud with each point once, and where the camera that saw it is, also if that is the origin."""
+    points, normals = checked_cloud(
+        cloud, fewest=MIN_POINTS, shortest=SHORTEST, longest=LONGEST, what="an object"
+    )
+    if normals is None or not hasattr(cloud, "eyes"):
+        raise InputError(
+            "a fused cloud without normals or eyes; expected a FusedCloud(points, normals, eyes), or the cloud of "
+            "each camera with estimate_views"
+        )
+    if cloud.eyes is None:
+        return FusedCloud(points, normals, np.zeros_like(points))
+    given, eyes = np.asarray(cloud.points), np.asarray(cloud.eyes)
+    if eyes.shape != given.shape or eyes.dtype.kind not in "fiu" or not np.isfinite(eyes).all():
+        raise InputError(
+            f"eyes of shape {eyes.shape} and type {eyes.dtype} with points of shape {given.shape}; expected as many, finite"
+        )
+    return FusedCloud(points, normals, eyes[distinct_rows(given)])
+
+
 def _towards(
     points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 3"]:
@@ -208,10 +230,3 @@ def _towards(
 
 def _moved(estimate: PoseEstimate, T_common_camera: Float[np.ndarray, "4 4"]) -> PoseEstimate:
     return replace(estimate, pose=T_common_camera @ estimate.pose.astype(float), hypotheses=())
-
-
-def _is_rigid(frame: Float[np.ndarray, "4 4"]) -> bool:
-    rotation = frame[:3, :3]
-    if not np.isfinite(frame).all() or (frame[3] != (0, 0, 0, 1)).any():
-        return False
-    return np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) and np.linalg.det(rotation) > 0

@@ -19,6 +19,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import invert
 from manipose_mj.ppf_jax.confidence import Scores, alike, scores_of
 from manipose_mj.ppf_jax.estimator import PoseEstimator, distinct_first, prepared_sample
+from manipose_mj.ppf_jax.points.camera_frames import checked_frames
 from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, seeds_of
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.evidence import Evidence
@@ -86,7 +87,7 @@ class MultiViewEstimator:
           key: Of all that is drawn.
 
         Raises:
-          InputError: There is no cloud, one cannot be used, or there is not one frame a cloud.
+          InputError: There is no cloud, one cannot be used, or there is not one rigid frame a cloud.
         """
         found = score_together(self.single, clouds, T_common_camera, key=key)
         confidence = _sigmoid(found.log_odds)
@@ -109,19 +110,19 @@ def score_together(
 ) -> ScoredTogether:
     """Every view's hypotheses, read in all views; arguments and errors are those of `estimate_views`."""
     model = estimator.trained.model
-    frames = np.asarray(T_common_camera, float)
     if not isinstance(model, PoseModel):
         raise InputError("views are scored together by our networks only; estimate each by itself")
-    if not clouds or frames.shape != (len(clouds), 4, 4):
-        raise InputError(
-            f"{len(clouds)} clouds and camera frames of shape {frames.shape}; expected one or more, "
-            "and a 4x4 frame each"
-        )
+    frames = checked_frames(T_common_camera, len(clouds))
     seeds_of(key)
     poses, extents, penalty, leads, seen = [], [], [], [], []
     for number, (cloud, frame) in enumerate(zip(clouds, frames, strict=True)):
         own = jax.random.fold_in(key, number)
-        sample = prepared_sample(model, cloud, key=own)
+        try:
+            sample = prepared_sample(model, cloud, key=own)
+        except InputError as error:
+            raise InputError(
+                f"cloud {number}: {error}" if len(clouds) > 1 else str(error)
+            ) from None
         found, evidence = _estimate_with_evidence(model, *sample, key=own)
         seen.append(evidence)
         poses.append(frame @ np.asarray(found.poses, float))

@@ -90,7 +90,8 @@ def test_clouds_are_padded_to_few_sizes(estimator, scene, monkeypatch, count, si
     monkeypatch.setattr(articulated_estimator, "estimate_furniture", stopped)
     view = scene.views[0]
     rows = np.arange(count) % len(view.points)
-    cloud = SimpleNamespace(points=view.points[rows], normals=view.normals[rows])
+    apart = np.random.default_rng(0).normal(0, 1e-3, (count, 3)).astype(np.float32)
+    cloud = SimpleNamespace(points=view.points[rows] + apart, normals=view.normals[rows])
     with pytest.raises(Enough):
         estimator.estimate(cloud, key=KEY)
 
@@ -114,9 +115,11 @@ def test_clouds_that_cannot_be_used(estimator, scene, change, message):
         estimator.estimate(change(scene.views[0].points), key=KEY)
 
 
-def test_an_up_that_is_no_direction(estimator, scene):
-    with pytest.raises(InputError, match="expected a direction"):
-        estimator.estimate(scene.views[0].points, key=KEY, up=(0, 0, 0))
+@pytest.mark.parametrize("up", [(0, 0, 0), "abc", (0, "z", 1), None])
+@pytest.mark.usefixtures("wrong_arrays")
+def test_an_up_that_is_no_direction(estimator, scene, up):
+    with pytest.raises(InputError, match="up is .*; expected a direction"):
+        estimator.estimate(scene.views[0].points, key=KEY, up=up)
 
 
 def test_weights_come_back(estimator, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -50,10 +51,11 @@ def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
         answer = estimator.estimate(mug.points[:count], key=KEY)
         assert answer.pose.shape == (4, 4) and np.isfinite(answer.pose).all()
     assert traced == [CONFIG.points]
-    repeated = np.tile(mug.points, (6, 1)) + np.float32(1e-4)
+    rng = np.random.default_rng(0)
+    many = np.tile(mug.points, (6, 1)) + rng.normal(0, 1e-4, (1500, 3)).astype(np.float32)
     assert [bucket(n) for n in (32, 256, 257, 512, 1024)] == [256, 256, 512, 512, 1024]
-    estimator.estimate(repeated, key=KEY)
-    estimator.estimate(repeated[:900], key=KEY)
+    estimator.estimate(many, key=KEY)
+    estimator.estimate(many[:900], key=KEY)
     assert traced == [CONFIG.points]
 
 
@@ -139,6 +141,7 @@ def _with(points, row, value):
         (lambda p: _with(p, 7, np.nan), "1 of 250 points are not finite"),
         (lambda p: 1000 * p, "millimetres"),
         (lambda p: np.tile(p[:1], (60, 1)), "all points are equal"),
+        (lambda p: np.tile(p[:20], (3, 1)), "60 points of which 20 differ; expected at least 32"),
     ],
 )
 @pytest.mark.usefixtures("wrong_arrays")
@@ -155,6 +158,35 @@ def test_normals_must_fit_the_points(trained, mug):
     short = dataclasses.replace(mug, normals=mug.normals[:-1])
     with pytest.raises(InputError, match="normals of shape"):
         PoseEstimator(trained).estimate(short, key=KEY)
+    words = Cloud(mug.points, mug.points.astype(str))
+    with pytest.raises(InputError, match="normals of type <U.*; expected numbers"):
+        PoseEstimator(trained).estimate(words, key=KEY)
+
+
+def test_repeated_points_and_padding_change_no_sample(trained, mug):
+    def sample(points, normals=None):
+        cloud = points if normals is None else Cloud(points, normals)
+        return module.prepared_sample(trained.model, cloud, key=KEY)
+
+    padding = np.zeros((90, 3), np.float32)
+    again = np.random.default_rng(0).integers(0, len(mug), 300)
+    for extra in (padding, mug.points[again]):
+        for one, other in zip(
+            sample(mug.points), sample(np.concatenate([mug.points, extra])), strict=True
+        ):
+            np.testing.assert_array_equal(one, other)
+    padded = (np.concatenate([rows, padding]) for rows in (mug.points, mug.normals))
+    for one, other in zip(sample(mug.points, mug.normals), sample(*padded), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_what_has_points_and_no_normals_is_points_alone(trained, mug):
+    alone = module.prepared_sample(trained.model, mug.points, key=KEY)
+    for cloud in (SimpleNamespace(points=mug.points), Cloud(mug.points, 0 * mug.normals)):
+        found = module.prepared_sample(trained.model, cloud, key=KEY)  # type: ignore[arg-type]
+        for one, other in zip(alone, found, strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.usefixtures("wrong_arrays")
@@ -167,7 +199,7 @@ def test_points_and_normals_make_a_cloud_and_a_pair_of_them_does_not(trained, mu
             estimator.estimate(pair, key=KEY)
 
 
-@pytest.mark.parametrize("key", [0, None, "seed"])
+@pytest.mark.parametrize("key", [0, None, "seed", jax.random.split(KEY, 3)])
 @pytest.mark.usefixtures("wrong_arrays")
 def test_what_is_no_key_is_one_line(trained, mug, key):
     estimator = PoseEstimator(trained)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, catalogue_subj
 from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.fused_views import FusedViewEstimator, fused_cloud
+from manipose_mj.ppf_jax.points.cloud_input import Cloud
 
 KEY = jax.random.key(0)
 COMMON = compose(rotation_about(np.array([0.0, 0, 1]), 0.7), np.array([0.3, -0.2, 0.1]))
@@ -88,6 +90,35 @@ def test_what_cannot_be_fused_is_told(views, frames):
             estimator.estimate_views(views, wrong, key=KEY)
     with pytest.raises(InputError, match="learnt from one camera"):
         FusedViewEstimator(PoseEstimator.load("cup")).estimate_views(views, frames, key=KEY)
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_a_fused_cloud_that_cannot_be_used_is_one_line(views, frames):
+    estimator = FusedViewEstimator.load("cup")
+    cloud, _ = fused_cloud(views, frames, rng=np.random.default_rng(0))
+    wrong = {
+        "without normals or eyes": Cloud(cloud.points, cloud.normals),
+        "points are not finite": replace(cloud, points=cloud.points * np.nan),
+        "eyes of shape": replace(cloud, eyes=cloud.eyes[:-1]),
+        "expected at least 32": replace(
+            cloud, points=cloud.points[:9], normals=cloud.normals[:9], eyes=cloud.eyes[:9]
+        ),
+    }
+    for words, each in wrong.items():
+        with pytest.raises(InputError, match=words):
+            estimator.estimate_fused(each, key=KEY)
+    bad = views[2].points.copy()
+    bad[0] = np.nan
+    with pytest.raises(InputError, match="cloud 2: 1 of .* points are not finite"):
+        estimator.estimate_views([*views[:2], bad], frames, key=KEY)
+
+
+def test_what_one_camera_sees_once_counts_once(views, frames):
+    """A view of one repeated point counts as one of too few points."""
+    points = [view.points for view in views]
+    few = [np.repeat(points[0][:1], len(points[0]), axis=0), *points[1:]]
+    found, _ = fused_cloud(few, frames, rng=np.random.default_rng(0))
+    assert len(found.points) == sum(min(len(each), 256) for each in points[1:])
 
 
 @pytest.mark.parametrize("object_type", ["axial", "mirror", "functional"])

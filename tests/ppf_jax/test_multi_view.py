@@ -58,3 +58,30 @@ def test_a_camera_without_a_frame_is_told(estimator, views):
         estimator.estimate_views(views, np.eye(4)[None], key=KEY)
     with pytest.raises(InputError, match="0 clouds"):
         estimator.estimate_views([], np.zeros((0, 4, 4)), key=KEY)
+
+
+def _with(frames, row, column, value):
+    frames = frames.copy()
+    frames[1, row, column] = value
+    return frames
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda f: _with(f, 0, 3, np.nan),
+        lambda f: _with(f, 3, 0, 0.1),
+        lambda f: f * np.array([[[1.0]], [[1000.0]], [[1.0]]]),
+        lambda f: np.stack([f[0], np.diag([-1.0, 1, 1, 1]), f[2]]),
+    ],
+)
+def test_a_camera_frame_that_is_not_rigid_is_named(estimator, views, change):
+    frames = np.stack([np.eye(4)] * 3)
+    with pytest.raises(InputError, match="camera frame 1 is no rigid transform"):
+        estimator.estimate_views(views, change(frames), key=KEY)
+
+
+def test_a_cloud_that_cannot_be_used_is_named(estimator, views):
+    clouds = [views[0].points[:10], *views[1:]]
+    with pytest.raises(InputError, match="cloud 0: cloud of 10 points"):
+        estimator.estimate_views(clouds, np.stack([np.eye(4)] * 3), key=KEY)

@@ -100,7 +100,7 @@ def test_nothing_makes_an_answer_that_is_no_number(cups, estimate):
     line = np.linspace([0, 0, 0.5], [0.1, 0, 0.6], 60).astype(np.float32)
     plane = line * 0
     plane[:, 2], plane[:, :2] = 0.5, rng.uniform(-0.05, 0.05, (60, 2))
-    twice = np.repeat(cups[0].points[:20], 3, axis=0)
+    twice = np.repeat(cups[0].points[:40], 3, axis=0)
     apart = np.concatenate([cups[0].points[:30], cups[0].points[:30] + np.float32(0.4)])
     unusual = [noise, line, plane, twice, apart, partly_hidden(cups[1].points, 0.8, rng)]
     found = estimate(unusual + [cups[0].points] * (COUNT - len(unusual)))

@@ -1,0 +1,52 @@
+"""Clouds as they come: what is repeated counts once, normals that are unknown are estimated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipose_mj.ppf_jax.points.cloud_input import Cloud, checked_cloud, distinct_rows
+from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+
+LIMITS = {"fewest": 32, "shortest": 1e-3, "longest": 5.0, "what": "an object"}
+
+
+@pytest.fixture
+def plane():
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.uniform(-0.1, 0.1, (200, 2)), np.full((200, 1), 0.7)], axis=1)
+    return points.astype(np.float32)
+
+
+def test_points_that_differ_stay_as_they_are(plane):
+    normals = np.tile(np.float32([0, 0.6, -0.8]), (200, 1))
+    points, same = checked_cloud(Cloud(plane, normals), **LIMITS)
+    np.testing.assert_array_equal(points, plane)
+    assert same is normals
+
+
+def test_the_first_of_repeated_points_is_kept_in_its_place(plane):
+    rows = np.random.default_rng(1).integers(0, 200, 500)
+    first = np.sort(np.unique(rows, return_index=True)[1])
+    np.testing.assert_array_equal(np.flatnonzero(distinct_rows(plane[rows])), first)
+    normals = np.random.default_rng(2).normal(size=(500, 3))
+    points, own = checked_cloud(Cloud(plane[rows], normals), **LIMITS)
+    np.testing.assert_array_equal(points, plane[rows][first])
+    np.testing.assert_array_equal(own, normals[first])
+
+
+def test_rows_of_zeros_are_padding_and_one_is_a_point(plane):
+    one, many = np.zeros((1, 3), np.float32), np.zeros((60, 3), np.float32)
+    assert distinct_rows(np.concatenate([one, plane])).all()
+    padded = np.concatenate([many, plane, many])
+    np.testing.assert_array_equal(plane, padded[distinct_rows(padded)])
+
+
+def test_normals_that_are_zero_are_estimated_and_others_stay(plane):
+    normals = np.tile(np.float32([0, 0.6, -0.8]), (200, 1))
+    normals[::3] = 0
+    _, filled = checked_cloud(Cloud(plane, normals), **LIMITS)
+    assert filled is not None
+    np.testing.assert_array_equal(filled[1::3], normals[1::3])
+    np.testing.assert_array_equal(filled[::3], cloud_normals(plane)[::3])
+    assert checked_cloud(Cloud(plane, 0 * normals), **LIMITS)[1] is None
