@@ -56,6 +56,7 @@ class PoseClouds:
         self.categories = tuple(c for c in known if c not in leave_out)
         if not self.categories:
             raise InputError(f"--leave-out leaves nothing of {name}")
+        self._leave_out = frozenset(leave_out)
         self._labels = labels
         self._jobs = jobs
 
@@ -109,11 +110,30 @@ class PoseClouds:
         """The views in folders of `read_views` of what is of the category, or of the type, and has `known`.
 
         Raises:
-          InputError: A folder has no views.
+          InputError: They are wanted with the sources' labels, a folder has no views or damaged ones, or nothing in
+            all folders is of the category or type, not left out, and has the symmetry.
         """
+        if not folders:
+            return []
+        if self._labels == "original":
+            raise InputError(
+                "--scan-views have unified labels only; leave out --labels original or --scan-views"
+            )
         scans = [scan for folder in folders for scan in read_views(folder)]
-        chosen = [scan for scan in scans if self._name in (scan.category, scan.object_type)]
-        return [cloud for scan in chosen if known.holds(scan.symmetry) for cloud in scan.clouds]
+        clouds = [
+            cloud
+            for scan in scans
+            if self._name in (scan.category, scan.object_type)
+            and scan.category not in self._leave_out
+            and known.holds(scan.symmetry)
+            for cloud in scan.clouds
+        ]
+        if not clouds:
+            raise InputError(
+                f"{folders[0]}: none of {len(scans)} scans is of {self._name}, not left out and as symmetric as "
+                "the catalogue's objects; leave out --scan-views"
+            )
+        return clouds
 
     def fitting_assets(
         self, directories: Sequence[Path], known: CommonSymmetry
@@ -129,7 +149,7 @@ class PoseClouds:
 
         Raises:
           InputError: They are wanted with the sources' labels, a folder has no asset of the category or type, one
-            cannot be read, or none has the symmetry.
+            cannot be read, all are left out, or none has the symmetry.
         """
         if not directories:
             return ()
@@ -137,7 +157,14 @@ class PoseClouds:
             raise InputError(
                 "--assets have unified labels only; leave out --labels original or --assets"
             )
-        found = [a for folder in directories for a in chosen_assets(folder, self._name)]
+        found = [
+            asset
+            for folder in directories
+            for asset in chosen_assets(folder, self._name)
+            if asset.category not in self._leave_out
+        ]
+        if not found:
+            raise InputError(f"{directories[0]}: --leave-out leaves no asset of {self._name}")
         fitting = tuple(asset for asset in found if known.holds(asset.label.symmetry))
         for asset in found:
             if asset not in fitting:

@@ -51,7 +51,7 @@ def train_pose(
         its categories.
       out: Folder to write to; without it pose/NAME, or pose/NAME-cppf, pose/NAME-original,
         pose/NAME-cppf-original.
-      leave_out: Categories of the type that are not trained on.
+      leave_out: Categories of the type that are not trained on, neither their built assets and scans.
       method: Our estimator, or CPPF as published, to compare with; for the latter --batch 8 is enough
         on a CPU.
       labels: The unified labels, or those of the sources that the objects are assigned to.

@@ -48,16 +48,37 @@ def read_views(folder: Path) -> list[ScanViews]:
     """All scans that `benchmarks/flips/scan_views.py` rendered into a folder.
 
     Raises:
-      InputError: There are none.
+      InputError: There are none, the index is none, or a file of it is missing or damaged.
     """
     try:
         index = json.loads((folder / INDEX).read_text())
     except (OSError, ValueError):
         raise InputError(f"{folder}: no views of scans; render some with scan_views.py") from None
-    return [
-        ScanViews(name, category, kind, tuple(read_clouds(folder / f"{name}.npz", name, category)))
-        for name, (category, kind) in sorted(index.items())
-    ]
+    if not isinstance(index, dict) or not all(map(_is_kind, index.values())):
+        raise InputError(
+            f"{folder / INDEX}: expected a dictionary of scans, [category, object type] each; "
+            "render them again with scan_views.py"
+        )
+    return [_read_scan(folder, name, *kind) for name, kind in sorted(index.items())]
+
+
+def _is_kind(value: Any) -> bool:
+    return (
+        isinstance(value, list) and len(value) == 2 and all(isinstance(each, str) for each in value)
+    )
+
+
+def _read_scan(folder: Path, name: str, category: str, kind: Any) -> ScanViews:
+    path = folder / f"{name}.npz"
+    try:
+        clouds = tuple(read_clouds(path, name, category))
+    except FileNotFoundError:
+        raise InputError(f"{path}: missing, though {INDEX} names it; render it again") from None
+    except Exception as error:  # whatever a damaged file makes the readers raise
+        raise InputError(f"{path}: not a whole file of views ({error}); render it again") from None
+    if not clouds:
+        raise InputError(f"{path}: a scan without views; render it again")
+    return ScanViews(name, category, kind, clouds)
 
 
 def write_clouds(path: Path, clouds: Sequence[LabelledCloud]) -> None:
