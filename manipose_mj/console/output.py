@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -29,8 +30,16 @@ def standard_error() -> Console:
 
 
 def write_json(document: Any) -> None:
-    """Plain JSON on standard output, for other programs."""
-    sys.stdout.write(json.dumps(document, indent=1) + "\n")
+    """Plain JSON on standard output, for other programs; figures that are not finite are null."""
+    sys.stdout.write(json.dumps(_finite(document), indent=1, allow_nan=False) + "\n")
+
+
+def _finite(document: Any) -> Any:
+    if isinstance(document, dict):
+        return {name: _finite(value) for name, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [_finite(value) for value in document]
+    return None if isinstance(document, float) and not math.isfinite(document) else document
 
 
 @contextmanager

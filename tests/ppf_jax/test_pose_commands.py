@@ -13,7 +13,11 @@ import pytest
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator
+from manipose_mj.ppf_jax.data.articulated import cache
 from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator
+from manipose_mj.ppf_jax.evaluation import part_evaluation
+from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors
 from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.training.curve_picture import draw_curve
@@ -132,6 +136,32 @@ def test_assets_are_unseen_by_their_own_category(evaluated, tmp_path, assets, na
     for category in assets:
         write_asset(tmp_path, category, category)
     assert evaluated(name, "--assets", str(tmp_path))["trained_on"] is known
+
+
+def test_furniture_is_evaluated_by_category_as_valid_json(monkeypatch, capsys, caplog):
+    unknown = PartErrors(
+        "cabinet_000/0 door", True, False, *2 * [float("inf")], False, *3 * [float("inf")], 0.0
+    )
+    found = part_evaluation.Evaluated([unknown], 3, 2)
+    monkeypatch.setattr(ArticulatedEstimator, "load", lambda: None)
+    scenes = [SimpleNamespace(category=category) for category in ("cabinet", "oven")]
+    monkeypatch.setattr(cache, "furniture_scenes", lambda *_, **__: scenes)
+    monkeypatch.setattr(part_evaluation, "scene_clouds", lambda *_, **__: [])
+    monkeypatch.setattr(part_evaluation, "evaluated", lambda *_: found)
+    assert main(["pose", "evaluate-articulated", "--scenes", "1", "--jobs", "1", "--json"]) == 0
+    printed = capsys.readouterr().out
+    assert "NaN" not in printed and "Infinity" not in printed
+    rows = json.loads(printed)
+    assert [(row["views"], row["category"]) for row in rows] == [
+        (1, "all"),
+        (1, "cabinet"),
+        (3, "all"),
+        (3, "cabinet"),
+    ]
+    assert rows[0]["false_positives_per_cloud"] == 1.5
+    assert "false_positives_per_cloud" not in rows[1]
+    assert rows[0]["centre_cm_median"] is None and rows[0]["all_right"] is None
+    assert "oven: no handle shows (views: 1), left out" in caplog.text
 
 
 def test_a_curve_is_drawn_with_and_without_held_out_errors(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +11,8 @@ from tyro.conf import arg
 from manipose_mj.cli.pose.train import CURVE_PICTURE, WEIGHTS_FILE, file_digest, require_positive
 from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 _CALIBRATION = 320  # clouds that confidence is fitted on
 
@@ -181,12 +184,16 @@ def evaluate_articulated(
     rows = []
     for fused in (1, 3):
         found = evaluated(estimator, scene_clouds(shown, fused=fused))
-        for category in ("all", *dict.fromkeys(scene.category for scene in shown)):
-            own = [e for e in found.errors if category == "all" or e.name.startswith(category)]
-            rows.append({"views": fused, "category": category} | summary(own, 0, found.clouds))
-        rows[-1 - len({scene.category for scene in shown})]["false_positives_per_cloud"] = (
-            found.false_positives / found.clouds
-        )
+        figures = summary(found.errors, found.false_positives, found.clouds)
+        rows.append({"views": fused, "category": "all"} | figures)
+        for category in dict.fromkeys(scene.category for scene in shown):
+            own = [e for e in found.errors if e.name.startswith(category)]
+            if not own:
+                log.warning("%s: no handle shows (views: %d), left out", category, fused)
+                continue
+            figures = summary(own, 0, found.clouds)
+            del figures["false_positives_per_cloud"]  # nobody knows of which category they are
+            rows.append({"views": fused, "category": category} | figures)
     if json:
         output.write_json(rows)
         return 0

@@ -108,7 +108,7 @@ def train(
       initial: A model of the same sizes, whose weights to start from instead of random ones.
       about: What batches and `initial` are, as JSON: a state of others is not gone on from.
       held_out: Batches to measure on, of one shape.
-      minutes: Ends the training, cooled down, if the steps do not.
+      minutes: Ends the training, cooled down, if the steps do not; those of all calls together.
       progress: Told every row of the curve.
 
     Raises:
@@ -119,35 +119,46 @@ def train(
     if initial is not None:
         model = with_weights_of(model, initial)
     stated = json.loads(json.dumps(about or {}))
-    state, curve = _resumed(folder, model, config, stated)
+    state, curve, earlier = _resumed(folder, model, config, stated)
     start = int(state.step)
     began = saved = time.monotonic()
-    earlier = float(curve[-1]["seconds"]) if curve else 0.0
+    parts: dict[str, Array] = {}
+
+    def spent() -> float:
+        return earlier + time.monotonic() - began
+
+    def add_row(step: int, *, measured: bool) -> None:
+        row = {"step": step, "seconds": round(spent(), 2)}
+        row |= {name: float(value) for name, value in parts.items()}
+        if held_out and measured:
+            row |= evaluate(state.model, held_out)
+        curve.append(row)
+        log.info("%s", row)
+        if progress is not None:
+            progress(row)
+
     feed = batches(start)
     placed = _placement()
     for step in range(start, config.steps):
-        spent = earlier + time.monotonic() - began
         share = step / config.steps
         if minutes is not None:
-            share = max(share, spent / (60 * minutes))
+            share = max(share, spent() / (60 * minutes))
             if share >= 1:
+                if parts:
+                    if curve and curve[-1]["step"] == step - 1:
+                        curve.pop()  # the same, maybe not measured
+                    add_row(step - 1, measured=True)
                 break
         rate = jnp.float32(learning_rate(config, step, share))
         state, parts = _step(state, placed(next(feed)), rate, config)
         last = step + 1 == config.steps
         if step % config.log_every == 0 or last:
-            row = {"step": step, "seconds": round(earlier + time.monotonic() - began, 2)}
-            row |= {name: float(value) for name, value in parts.items()}
-            if held_out and (last or (step and step % config.evaluate_every == 0)):
-                row |= evaluate(state.model, held_out)
-            curve.append(row)
-            log.info("%s", row)
-            if progress is not None:
-                progress(row)
+            evaluated = step > 0 and step % config.evaluate_every == 0
+            add_row(step, measured=last or evaluated)
         if time.monotonic() - saved > config.save_every:
-            _save(folder, state, curve, config, stated)
+            _save(folder, state, curve, config, stated, spent())
             saved = time.monotonic()
-    _save(folder, state, curve, config, stated)
+    _save(folder, state, curve, config, stated, spent())
     return state.model
 
 
@@ -293,11 +304,12 @@ def _fresh(model: Any, config: TrainingConfig) -> TrainingState:
 
 def _resumed(
     folder: Path, model: Any, config: TrainingConfig, about: dict[str, Any]
-) -> tuple[TrainingState, list[Row]]:
+) -> tuple[TrainingState, list[Row], float]:
+    """The state, the curve and the seconds that were spent on them."""
     fresh = _fresh(model, config)
     path = folder / STATE_FILE
     if not path.is_file():
-        return fresh, []
+        return fresh, [], 0.0
     try:
         with open(path, "rb") as file:
             header = json.loads(file.readline())
@@ -311,7 +323,10 @@ def _resumed(
                 raise InputError(
                     f"{path}: the state of a training with other {', '.join(sorted(others))}; give another folder"
                 )
-            return eqx.tree_deserialise_leaves(file, fresh), header["curve"]
+            curve = header["curve"]
+            # States that do not say so were written soon after their last row.
+            seconds = header.get("seconds", curve[-1]["seconds"] if curve else 0.0)
+            return eqx.tree_deserialise_leaves(file, fresh), curve, float(seconds)
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes the readers raise
@@ -330,12 +345,14 @@ def _save(
     curve: list[Row],
     config: TrainingConfig,
     about: dict[str, Any],
+    seconds: float,
 ) -> None:
     """The state with its curve in one file, so that they cannot disagree; the curve beside it."""
     header = {
         "config": _described(state.model.config, config),
         "about": about,
         "curve": curve,
+        "seconds": seconds,
     }
     with replacing(folder / STATE_FILE) as scratch, open(scratch, "wb") as file:
         file.write(json.dumps(header).encode() + b"\n")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
+import equinox as eqx
 import jax
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from manipose_mj.ppf_jax.rigid.model import ModelConfig, PoseModel
 from manipose_mj.ppf_jax.rigid.network import NetworkConfig
 from manipose_mj.ppf_jax.rigid.refinement import RefinementConfig
 from manipose_mj.ppf_jax.rigid.voting import VotingConfig
+from manipose_mj.ppf_jax.training import loop
 from manipose_mj.ppf_jax.training.loop import (
     CURVE_FILE,
     STATE_FILE,
@@ -37,6 +40,21 @@ CONFIG = TrainingConfig(
     save_every=0.0,
     loss=LossConfig(pairs=200),
 )
+
+
+@dataclasses.dataclass(frozen=True)
+class Tiny:
+    """The configuration of `Weights`."""
+
+
+class Weights(eqx.Module):
+    """The smallest model."""
+
+    values: jax.Array
+    config: Tiny = eqx.field(static=True)
+
+    def __init__(self, config, *, rng):
+        self.values, self.config = jax.numpy.asarray(rng.normal(size=3)), config
 
 
 class Broken(Exception):
@@ -156,6 +174,51 @@ def test_the_mean_of_weights_is_of_one_model_s_sizes(model_config, whole):
 def test_no_time_means_no_steps(bowls, model_config, tmp_path):
     train(_batches(bowls, breaks_at=0), model_config, CONFIG, tmp_path, minutes=1e-9)
     assert json.loads((tmp_path / CURVE_FILE).read_text()) == []
+
+
+@pytest.fixture
+def timed(bowls, monkeypatch, tmp_path):
+    """Trains for some seconds of a clock by which each step takes one; gives the curve."""
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(loop.time, "monotonic", lambda: clock.now)
+    monkeypatch.setattr(loop, "evaluate", lambda *_: {"deg_median": 1.0})
+    held_out = [batch_clouds(bowls[:2], rng=np.random.default_rng(0), points=POINTS)]
+
+    def stepped(state, *_):
+        clock.now += 1.0
+        return dataclasses.replace(state, step=state.step + 1), {"loss": 0.0}
+
+    monkeypatch.setattr(loop, "_step", stepped)
+
+    def curve(seconds, breaks_at=None):
+        config = dataclasses.replace(CONFIG, log_every=4, save_every=1e9)
+        batches = _batches(bowls, breaks_at=breaks_at)
+        minutes = seconds / 60
+        train(batches, Tiny(), config, tmp_path, build=Weights, held_out=held_out, minutes=minutes)
+        return json.loads((tmp_path / CURVE_FILE).read_text())
+
+    return curve
+
+
+def test_time_that_is_over_ends_the_curve_with_held_out_errors(timed, tmp_path):
+    curve = timed(7)
+    assert [(row["step"], row["seconds"]) for row in curve] == [(0, 1), (4, 5), (6, 7)]
+    assert ["deg_median" in row for row in curve] == [False, False, True]
+    # Called again there is no time left.
+    assert timed(7, breaks_at=7) == curve
+    # More of it goes on, with a row of its own where a usual one had no errors.
+    curve = timed(9)
+    assert [row["step"] for row in curve] == [0, 4, 6, 8]
+    assert "deg_median" in curve[-1]
+
+
+def test_a_state_that_does_not_say_its_seconds_is_read(timed, tmp_path):
+    curve = timed(6)
+    head, rest = (tmp_path / STATE_FILE).read_bytes().split(b"\n", 1)
+    old = json.loads(head)
+    del old["seconds"]
+    (tmp_path / STATE_FILE).write_bytes(json.dumps(old).encode() + b"\n" + rest)
+    assert timed(6, breaks_at=6) == curve
 
 
 def test_the_learning_rate_rises_holds_and_falls():
