@@ -19,6 +19,7 @@ from jaxtyping import Float
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal
+_ROUNDING = 1e-6  # how far a score may be beyond 0 and 1
 _LAST_ROW = [0.0, 0.0, 0.0, 1.0]
 
 
@@ -60,9 +61,13 @@ def _other(number: int, answer: Any, mesh: Mapping[str, np.ndarray] | None) -> P
 
 
 def _told(estimate: PoseEstimate) -> dict[str, Any]:
-    """An estimate as the dictionary that would say it."""
-    known = np.isfinite(estimate.extents).all()
-    extents = estimate.extents if known else None
+    """An estimate as the dictionary that would say it; extents that are None or NaN are unknown."""
+    extents: Any = estimate.extents
+    try:
+        if extents is not None and not np.isfinite(np.asarray(extents, float)).all():
+            extents = None
+    except (TypeError, ValueError):
+        pass  # no numbers, as any answer's may be: told where they are read
     return {"pose": estimate.pose, "score": estimate.confidence, "extents": extents}
 
 
@@ -73,8 +78,9 @@ def _estimate(answer: Mapping[str, Any], mesh: Mapping[str, np.ndarray] | None) 
     if not rigid or np.linalg.det(rotation) < 0 or not np.allclose(pose[3], _LAST_ROW):
         raise EstimatorFailedError("pose is not a rigid transform")
     score = float(_array(answer, "score", ()))
-    if not 0 <= score <= 1:
-        raise EstimatorFailedError(f"score is {score:g}; expected 0 to 1")
+    if not -_ROUNDING <= score <= 1 + _ROUNDING:
+        raise EstimatorFailedError(f"score is {score!r}; expected 0 to 1")
+    score = min(max(score, 0.0), 1.0)
     if answer.get("extents") is not None:
         extents = _array(answer, "extents", (3,))
         if (extents <= 0).any():

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_type_hints
+from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
 import jax
 import jax.numpy as jnp
@@ -26,6 +26,18 @@ from manipose_mj.storage.staging import staging
 
 FORMAT_VERSION = 2  # of the configuration's names and of the arrays' order
 _HEADER = "header"
+_NUMBERS: dict[type, tuple[type, ...]] = {int: (int,), float: (float, int), bool: (bool,)}
+# What a damaged file makes its readers raise; the zip's, for one of another compression or with a password, too.
+_DAMAGED = (
+    OSError,
+    EOFError,
+    LookupError,
+    TypeError,
+    ValueError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 MethodName: TypeAlias = Literal["ours", "cppf"]
 LabelSet: TypeAlias = Literal["unified", "original"]
 Cameras: TypeAlias = Literal["one", "several"]
@@ -85,16 +97,18 @@ def load_weights(path: Path) -> TrainedModel:
             arrays = [stored[name] for name in sorted(stored.files) if name != _HEADER]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file of weights") from None
-    except (OSError, EOFError, LookupError, TypeError, ValueError, zipfile.BadZipFile, zlib.error):
+    except _DAMAGED:
         raise InputError(
             f"{path}: not a whole file of weights; copy it again or train again"
         ) from None
+    if not isinstance(header, dict):
+        raise InputError(f"{path}: a header that is no dictionary; train again")
     if header.get("format") != FORMAT_VERSION:
         raise InputError(
             f"{path}: weights of format {header.get('format')}; this version reads "
             f"{FORMAT_VERSION}: train again or install the version that wrote them"
         )
-    if header.get("kind") not in _KINDS:
+    if header.get("kind") not in tuple(_KINDS):  # a list is in no dictionary
         raise InputError(
             f"{path}: weights of method {header.get('kind')!r}; this version knows {', '.join(_KINDS)}"
         )
@@ -107,10 +121,15 @@ def load_weights(path: Path) -> TrainedModel:
         categories = tuple(header["categories"])
         labels = header["labels"]
         cameras = header.get("cameras", "one")  # files of single views do not say
-    except (KeyError, TypeError, ValueError):
+        if labels not in get_args(LabelSet) or cameras not in get_args(Cameras):
+            raise ValueError("labels or cameras")
+        finite = all(np.isfinite(array).all() for array in arrays)
+    except Exception:  # whatever values of other types make the networks raise
         raise InputError(
             f"{path}: the weights do not fit their configuration; train again"
         ) from None
+    if not finite:
+        raise InputError(f"{path}: weights that are not finite; copy it again or train again")
     model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
     return TrainedModel(model, categories, labels, cameras)
 
@@ -129,13 +148,15 @@ def _config(kind: Any, stored: dict[str, Any]) -> Any:
 
     Raises:
       KeyError: It has no such field.
-      TypeError: It lacks a field.
+      TypeError: It lacks a field, or one is of another type.
     """
     types = get_type_hints(kind)
     values = {}
     for name, value in stored.items():
         if dataclasses.is_dataclass(types[name]):
             value = _config(types[name], value)
+        elif types[name] in _NUMBERS and type(value) not in _NUMBERS[types[name]]:
+            raise TypeError(f"{name} is {value!r}")
         values[name] = tuple(value) if isinstance(value, list) else value
     return kind(**values)
 

@@ -132,7 +132,8 @@ def test_options_that_do_not_go_together(words, message, capsys):
         ({"pose": 2 * np.eye(4), "score": 1}, "not a rigid transform"),
         ({"pose": "here", "score": 1}, "pose is not made of numbers"),
         ({"pose": np.eye(4) * (1 + 0j), "score": 1}, "pose is not made of numbers"),
-        ({"pose": IDENTITY, "score": 2}, "score is 2; expected 0 to 1"),
+        ({"pose": IDENTITY, "score": 2}, r"score is 2\.0; expected 0 to 1"),
+        ({"pose": IDENTITY, "score": 1.00001}, r"score is 1\.00001; expected 0 to 1"),
         ({"pose": IDENTITY, "score": np.nan}, "score is not finite"),
         ({"pose": IDENTITY, "score": 1, "extents": [1, 0, 1]}, "extents are not positive"),
         ({"pose": IDENTITY, "score": 1, "hypotheses": 3}, "hypotheses are a int"),
@@ -146,6 +147,15 @@ def test_options_that_do_not_go_together(words, message, capsys):
 def test_what_is_no_answer_is_said(answer, message):
     with pytest.raises(EstimatorFailedError, match=f"estimator mine: .*{message}"):
         EstimatorService("mine", answers.Says(answer)).estimate({})
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_scores_may_be_rounded_and_extents_unknown():
+    assert checked_answer({"pose": IDENTITY, "score": np.float32(1) + 1e-7}).confidence == 1.0
+    assert checked_answer({"pose": IDENTITY, "score": -1e-9}).confidence == 0.0
+    assert np.isnan(checked_answer(PoseEstimate(np.eye(4), None, 0.5)).extents).all()
+    with pytest.raises(EstimatorFailedError, match="extents is not made of numbers"):
+        checked_answer(PoseEstimate(np.eye(4), "long", 0.5))
 
 
 def test_answers_keep_hypotheses_and_extents():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -261,6 +262,62 @@ def test_a_truncated_file_is_named(trained, tmp_path, kept):
     path.write_bytes(path.read_bytes()[:kept])
     with pytest.raises(InputError, match="mug.npz: not a whole file of weights"):
         PoseEstimator.from_file(path)
+
+
+def _changed(path, change):
+    """The file with another header, or other arrays."""
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    header = change(json.loads(bytes(arrays["header"])), arrays)
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(path, **arrays)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda header, _: [1], "a header that is no dictionary"),
+        (lambda header, _: header | {"kind": ["ours"]}, "weights of method .*'ours'.*knows ours"),
+        (lambda header, _: header | {"config": [1]}, "do not fit their configuration"),
+        (
+            lambda header, _: header | {"config": header["config"] | {"pairs": "many"}},
+            "do not fit their configuration",
+        ),
+        (lambda header, _: header | {"cameras": "three"}, "do not fit their configuration"),
+        (lambda header, _: header | {"labels": ["unified"]}, "do not fit their configuration"),
+        (
+            lambda header, _: header | {"config": header["config"] | {"symmetry": None}},
+            "do not fit their configuration",
+        ),
+        (
+            lambda header, arrays: arrays.update(leaf_000=arrays["leaf_000"] * np.nan) or header,
+            "weights that are not finite",
+        ),
+        (
+            lambda header, arrays: arrays.update(leaf_000=arrays["leaf_000"].astype(str)) or header,
+            "do not fit their configuration",
+        ),
+    ],
+)
+def test_weights_with_a_wrong_header_or_values_are_named(trained, tmp_path, change, words):
+    path = tmp_path / "mug.npz"
+    save_weights(path, trained)
+    _changed(path, change)
+    with pytest.raises(InputError, match=f"mug.npz: .*{words}") as caught:
+        load_weights(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_compression_that_no_reader_knows_is_a_damaged_file(trained, tmp_path):
+    path = tmp_path / "mug.npz"
+    save_weights(path, trained)
+    for offset, value in ((8, 99), (6, 1)):  # of the first local header: method, flag of a password
+        stored = bytearray(path.read_bytes())
+        central = stored.index(b"PK\x01\x02")
+        stored[offset] = stored[central + offset + 2] = value
+        (tmp_path / "odd.npz").write_bytes(bytes(stored))
+        with pytest.raises(InputError, match="odd.npz: not a whole file of weights"):
+            load_weights(tmp_path / "odd.npz")
 
 
 def test_weights_of_another_version_are_named(trained, tmp_path, monkeypatch):
