@@ -221,7 +221,7 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
         )
     if override is not None:
         centred = replace(measured.label, center=box_center(body, measured.label))
-        write_measured(folder, replace(measured, label=centred))
+        write_measured(folder, replace(measured, label=centred, stable_poses=asset.stable_poses))
     return asset
 
 

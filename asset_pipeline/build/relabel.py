@@ -23,7 +23,7 @@ from manipose_mj.storage.staging import put_in_place, staging
 MEASURED_FILE = "measured.json"
 # In an asset's provenance: which entry of the labels file it has.
 OVERRIDE = "label override"
-# After the entry's digest: rest poses are those of the label before, so that a build is not up to date.
+# After a rigid asset's digest: rest poses are those of the label before, so that a build is not up to date.
 IN_PLACE = " in place"
 
 
@@ -77,7 +77,7 @@ def relabelled(asset: Asset, override: Override | None) -> Asset:
         shapes = visible_shapes(asset.folder)
         textured = any(s.texture is not None for own in shapes.values() for s in own)
         after = overridden(before, override, surface(shapes), textured=textured)
-        inputs[OVERRIDE] = override.digest + IN_PLACE
+        inputs[OVERRIDE] = override.digest + (IN_PLACE if asset.kind == "rigid" else "")
     after = replace(after, provenance=replace(after.provenance, inputs=inputs))
     with staging(asset.folder) as scratch:
         target = scratch / asset.folder.name

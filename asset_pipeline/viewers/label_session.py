@@ -139,10 +139,14 @@ class LabelSession:
         self.reset()
 
     def forget(self) -> None:
-        """Take the object out of the labels file, and give the asset back what was measured."""
+        """Give the asset back what was measured, and take the object out of the labels file.
+
+        Raises:
+          InputError: The asset cannot be relabelled; the file stays as it is.
+        """
+        self.asset = relabelled(self.asset, None)
         if self.labels.exists():
             put_entry(self.labels, self.asset.name, {})
-        self.asset = relabelled(self.asset, None)
         self.select(OBJECT)
 
     def _move(self, frame: FrameOverride) -> None:

@@ -67,7 +67,7 @@ def write_asset_json(asset: Asset, file: str = ASSET_FILE) -> None:
 
 
 def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
-    """Read and validate an asset folder, or what another file in it says of the asset.
+    """Read and validate an asset folder, or what another file in it says of the asset, which has no grasps then.
 
     Raises:
       InputError: A file is missing or a field is wrong; the message names both.
@@ -99,7 +99,7 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
         ),
         parts=tuple(_part(fields) for fields in document.each("parts")),
         areas=tuple(_area(fields) for fields in document.each("areas")),
-        grasps=read_grasps(folder / GRASPS_FILE, len(stable)),
+        grasps=read_grasps(folder / GRASPS_FILE, len(stable)) if file == ASSET_FILE else None,
         label_quality=read_quality(document.optional("label_quality")),
     )
 

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import tests.asset_pipeline.labelled_assets as made
+from asset_pipeline.build.relabel import MEASURED_FILE
 from asset_pipeline.viewers.label_session import OBJECT, LabelSession
 from manipose_mj.assets.asset_json import read_asset, write_asset_json
 from manipose_mj.assets.label_marks import label_lines, symmetry_planes
@@ -74,6 +75,16 @@ def test_a_saved_adjustment_is_in_the_file_and_in_the_asset(session, assets):
     np.testing.assert_array_equal(back.label.rotation, before.rotation)
     assert back.label_quality.confidence == 0.2
     assert yaml.safe_load(session.labels.read_text()) is None
+
+
+def test_what_cannot_be_taken_back_stays_in_the_file(session, assets):
+    session.turn(2, 30.0)
+    session.save()
+    text = session.labels.read_text()
+    (assets / "unsure" / MEASURED_FILE).write_text("{}")
+    with pytest.raises(InputError, match="measured.json"):
+        session.forget()
+    assert session.labels.read_text() == text
 
 
 def test_symmetry_goes_with_the_axes_that_a_person_sees(session, assets):

@@ -1,0 +1,76 @@
+"""Assets that were built with a person's labels: labelled otherwise, taken back and built again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tests.asset_pipeline.labelled_assets as made
+import tests.asset_pipeline.scan_files as files
+from asset_pipeline.build.data_set import build, up_to_date
+from asset_pipeline.build.relabel import (
+    MEASURED_FILE,
+    OVERRIDE,
+    measured,
+    relabel,
+    write_measured,
+)
+from asset_pipeline.labelling.overrides.reading import read_overrides
+from asset_pipeline.sources.meshes import MeshOptions
+from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset_json import read_asset
+
+
+def _labels(folder: Path, text: str) -> Path:
+    path = folder / "labels.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory) -> Asset:
+    """A box that can be held, built with a mass of 0.3 kg."""
+    folder = tmp_path_factory.mktemp("built")
+    mesh = folder / "brick.obj"
+    mesh.write_bytes(files.obj(files.box((0.12, 0.07, 0.05))))
+    labels = _labels(folder, "brick: {mass: 0.3}\n")
+    said = MeshOptions("box", None, "z", "m", "CC0")
+    (result,) = build("meshes", mesh, folder / "out", labels=labels, said=said)
+    assert (result.status, result.reason) == ("built", "")
+    return read_asset(result.folder)
+
+
+def test_an_asset_built_with_labels_takes_others_and_gives_back_what_was_measured(built, tmp_path):
+    assert len(built.grasps) > 0 and built.mass_properties.mass == 0.3
+    before = measured(built)
+    assert len(before.grasps) == len(built.grasps) and before.mass_properties.mass != 0.3
+    assert len(read_asset(built.folder, MEASURED_FILE).stable_poses) == len(built.stable_poses)
+    (after,) = relabel(built.folder, _labels(tmp_path, "brick: {mass: 0.4}\n"))
+    assert after.mass_properties.mass == 0.4 and len(after.grasps) == len(built.grasps)
+    (back,) = relabel(built.folder, _labels(tmp_path, "{}\n"))
+    assert back.mass_properties.mass == before.mass_properties.mass
+    assert not (built.folder / MEASURED_FILE).exists()
+
+
+def test_what_was_measured_is_read_without_the_rest_poses_that_grasps_are_of(tmp_path):
+    asset = made.block(tmp_path / "block")
+    write_measured(asset.folder, replace(asset, stable_poses=()))
+    assert read_asset(asset.folder, MEASURED_FILE).grasps is None
+    (after,) = relabel(asset.folder, _labels(tmp_path, "block: {mass: 0.7}\n"))
+    assert after.mass_properties.mass == 0.7
+    np.testing.assert_array_equal(after.grasps.clear, asset.grasps.clear)
+
+
+def test_labels_put_into_furniture_are_what_a_build_gives_but_not_those_of_rigid_assets(tmp_path):
+    text = "cupboard: {category: oven}\nblock: {mass: 0.7}\n"
+    assets = (made.cupboard(tmp_path / "out" / "cupboard"), made.block(tmp_path / "out" / "block"))
+    labels = _labels(tmp_path, text)
+    relabel(tmp_path / "out", labels)
+    for asset, same in zip(assets, (True, False), strict=True):
+        said = {OVERRIDE: read_overrides(labels)[asset.name].digest}
+        inputs = asset.provenance.inputs | said
+        assert up_to_date(asset.folder, inputs, asset.provenance.generator) is same
+    assert relabel(tmp_path / "out", labels) == []
