@@ -191,7 +191,13 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
     )
     draft = measured
     if override is not None:
-        draft = overridden(measured, override, scan.mesh, textured=scan.texture is not None)
+        draft = overridden(
+            measured,
+            override,
+            scan.mesh,
+            textured=scan.texture is not None,
+            texture=scan.texture,
+        )
         inputs = draft.provenance.inputs | {OVERRIDE: override.digest}
         draft = replace(draft, provenance=replace(draft.provenance, inputs=inputs))
     if scan.texture is None and getattr(scan.mesh.visual, "uv", None) is not None:

@@ -74,9 +74,7 @@ def relabelled(asset: Asset, override: Override | None) -> Asset:
     inputs = {key: value for key, value in before.provenance.inputs.items() if key != OVERRIDE}
     after = before
     if override is not None:
-        shapes = visible_shapes(asset.folder)
-        textured = any(s.texture is not None for own in shapes.values() for s in own)
-        after = overridden(before, override, surface(shapes), textured=textured)
+        after = overridden_as_seen(before, override)
         inputs[OVERRIDE] = override.digest + (IN_PLACE if asset.kind == "rigid" else "")
     after = replace(after, provenance=replace(after.provenance, inputs=inputs))
     with staging(asset.folder) as scratch:
@@ -89,6 +87,24 @@ def relabelled(asset: Asset, override: Override | None) -> Asset:
         _write_model(target / MODEL_FILE, after)
         put_in_place(target, asset.folder)
     return read_asset(asset.folder)
+
+
+def overridden_as_seen(before: Asset, override: Override) -> Asset:
+    """What the override makes of a measured asset, with what is seen in its folder; nothing is written.
+
+    Raises:
+      InputError: The override cannot be applied.
+    """
+    bodies = visible_shapes(before.folder)
+    shapes = [shape for own in bodies.values() for shape in own]
+    textured = any(shape.texture is not None for shape in shapes)
+    if len(shapes) != 1 or (texture := shapes[0].texture) is None:
+        return overridden(before, override, surface(bodies), textured=textured)
+    try:  # a scan with its print
+        return overridden(before, override, shapes[0].surface(), textured=True, texture=texture)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{texture}: cannot be read as the texture's image ({reason})") from None
 
 
 def measured(asset: Asset) -> Asset:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.build.relabel import measured, relabelled
-from asset_pipeline.labelling.overrides.applying import moved, overridden
+from asset_pipeline.build.relabel import measured, overridden_as_seen, relabelled
+from asset_pipeline.labelling.overrides.applying import moved
 from asset_pipeline.labelling.overrides.other_axes import symmetries_along
 from asset_pipeline.labelling.overrides.reading import (
     FrameOverride,
-    Override,
     parsed,
     read_entries,
 )
@@ -23,7 +22,6 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
 from manipose_mj.assets.label import PoseLabel
 from manipose_mj.assets.symmetry_names import SYMMETRIES, symmetry_name
-from manipose_mj.assets.visible_shapes import surface, visible_shapes
 from manipose_mj.errors import InputError, unknown_name
 
 # What is moved: the object's own label, else the handle of the part of this name.
@@ -133,7 +131,7 @@ class LabelSession:
         entries = read_entries(self.labels) if self.labels.exists() else {}
         entry = self._entry(dict(entries.get(name, {})))
         override = parsed(self.labels, name, entry)
-        self._try(override)
+        overridden_as_seen(measured(self.asset), override)
         put_entry(self.labels, name, entry)
         self.asset = relabelled(self.asset, override)
         self.reset()
@@ -171,11 +169,6 @@ class LabelSession:
         found = measured(self.asset).part(self.target).handle
         part["handle"] = _frame(dict(part.get("handle", {})), self.label, found)
         return {**entry, "parts": {**parts, self.target: part}}
-
-    def _try(self, override: Override) -> None:
-        shapes = visible_shapes(self.asset.folder)
-        textured = any(s.texture is not None for own in shapes.values() for s in own)
-        overridden(measured(self.asset), override, surface(shapes), textured=textured)
 
 
 def _frame(entry: dict[str, Any], label: PoseLabel, found: PoseLabel | None) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -25,7 +26,12 @@ _LIGHTEST = 1.2  # air
 
 
 def overridden(
-    asset: Asset, override: Override, surface: trimesh.Trimesh, *, textured: bool
+    asset: Asset,
+    override: Override,
+    surface: trimesh.Trimesh,
+    *,
+    textured: bool,
+    texture: Path | None = None,
 ) -> Asset:
     """The asset with what a person said in place of what was measured.
 
@@ -36,8 +42,9 @@ def overridden(
     Args:
       asset: As measured.
       override: The person's word.
-      surface: What is seen of the object, in the mesh frame, everything shut [m].
+      surface: What is seen of the object, in the mesh frame, everything shut [m]; with `uv` where `texture` is given.
       textured: Whether it has a texture.
+      texture: Its image, for which symmetries the print has; without, see `scan_label`.
 
     Raises:
       InputError: The object has no such part, handle or mass of its own; it cannot be measured; or its
@@ -62,7 +69,7 @@ def overridden(
             f"{override.where}: category: {category} has parts that move; expected that of a rigid object"
         )
     up = asset.up if override.up is None else override.up
-    found, quality = _measured(asset, override, surface, category, up, textured)
+    found, quality = _measured(asset, override, surface, category, up, textured, texture)
     label = _moved(found, override.frame, override.where)
     _check_units(override, label, surface)
     if label is not found:
@@ -155,6 +162,7 @@ def _measured(
     category: str,
     up: Float[np.ndarray, "3"],
     textured: bool,
+    texture: Path | None,
 ) -> tuple[PoseLabel, LabelQuality | None]:
     """The asset's label, or a new one where what it was measured from is another."""
     if asset.kind == "articulated":
@@ -178,6 +186,7 @@ def _measured(
             category=category,
             functional=override.functional,
             textured=textured,
+            texture=texture,
         )
     except InputError as error:
         raise InputError(f"{override.where}: cannot be measured as told ({error})") from None

@@ -22,6 +22,7 @@ from asset_pipeline.labelling.overrides.reading import read_overrides
 from asset_pipeline.sources.meshes import MeshOptions
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import read_asset
+from manipose_mj.errors import InputError
 
 
 def _labels(folder: Path, text: str) -> Path:
@@ -74,3 +75,27 @@ def test_labels_put_into_furniture_are_what_a_build_gives_but_not_those_of_rigid
         inputs = asset.provenance.inputs | said
         assert up_to_date(asset.folder, inputs, asset.provenance.generator) is same
     assert relabel(tmp_path / "out", labels) == []
+
+
+def test_a_label_that_is_measured_again_counts_its_print(tmp_path):
+    asset = made.block(tmp_path / "block")  # of one colour
+    labels = _labels(tmp_path, "block: {object_type: mirror, up: [1, 0, 0]}\n")
+    (after,) = relabel(asset.folder, labels)
+    assert len(after.label.symmetry.rotations) == 4
+    assert len(after.label.symmetry_textured.rotations) == 4
+    (image,) = asset.folder.glob("meshes/*.png")
+    image.write_bytes(b"no image")
+    with pytest.raises(InputError, match=r"png: cannot be read as the texture's image") as caught:
+        relabel(asset.folder, _labels(tmp_path, "block: {object_type: mirror, up: [0, 1, 0]}\n"))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_build_that_measures_as_told_counts_the_print(tmp_path):
+    box = files.box((0.2, 0.25, 0.3))  # too wide to grasp: quick
+    content = {"Blue_Box/model.obj": files.obj(box), "Blue_Box/texture.png": files.image()}
+    scans = files.write_folder(tmp_path / "scans", content)
+    labels = _labels(tmp_path, "Blue_Box: {object_type: mirror, up: [0, 1, 0]}\n")
+    (result,) = build("google_scanned_objects", scans, tmp_path / "out", labels=labels)
+    assert result.status == "built", result.reason
+    label = read_asset(result.folder).label
+    assert len(label.symmetry.rotations) == len(label.symmetry_textured.rotations) == 4
