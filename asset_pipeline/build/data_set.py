@@ -9,13 +9,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
+from xml.etree import ElementTree
 
 import numpy as np
 
 from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
-from asset_pipeline.build.relabel import OVERRIDE, relabelled, write_measured
-from asset_pipeline.build.replaceable import PLACE, check_origin, place
+from asset_pipeline.build.relabel import MEASURED_FILE, OVERRIDE, relabelled, write_measured
+from asset_pipeline.build.replaceable import PLACE, check_origin, check_source, place
 from asset_pipeline.build.rigid import box_center, finish_rigid
 from asset_pipeline.build.workers.limited_call import LimitError, Limits, limited_call
 from asset_pipeline.geometry.convexify import ConvexSettings, convexify
@@ -29,7 +30,7 @@ from asset_pipeline.sources.articulated_scan import ArticulatedScan
 from asset_pipeline.sources.meshes import MeshItem, MeshOptions
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from asset_pipeline.sources.scan import Scan, ScanItem, write_texture
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import GRASPS_FILE, Asset
 from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.assets.geometry import Body, MassProperties, Shape
 from manipose_mj.assets.label import ObjectType
@@ -132,7 +133,7 @@ def build_item(
 
     Raises:
       InputError: The object, or what a person said of its label, cannot be used; or `folder` is the asset of
-        another mesh.
+        another mesh or another source.
     """
     module = SOURCES[source]
     said = {} if override is None else {OVERRIDE: override.digest}
@@ -142,13 +143,14 @@ def build_item(
     if isinstance(item, MeshItem):
         check_origin(folder, item.file, meshes.SOURCE, inputs)
     with module.opened(item) as scan:
+        provenance = scan.provenance
+        check_source(folder, provenance.source)
         if isinstance(scan, ArticulatedScan):
-            provenance = replace(scan.provenance, generator=generator())
+            provenance = replace(provenance, generator=generator())
             asset = build_articulated(replace(scan, provenance=provenance), target)
             if override is not None:
                 relabelled(asset, override)
         else:
-            provenance = scan.provenance
             if isinstance(item, MeshItem):
                 where = {PLACE: place(item.file, folder)}
                 provenance = replace(provenance, inputs=provenance.inputs | where)
@@ -253,13 +255,28 @@ def generator() -> str:
 
 
 def up_to_date(folder: Path, inputs: dict[str, str], generator: str) -> bool:
-    """Whether an asset folder was built from these inputs by this generator, wherever they lay."""
+    """Whether an asset folder is whole and was built from these inputs by this generator, wherever they lay."""
     try:
-        provenance = read_asset(folder).provenance
+        asset = read_asset(folder)
+        provenance = asset.provenance
+        found = {key: value for key, value in provenance.inputs.items() if key != PLACE}
+        return found == inputs and provenance.generator == generator and _is_whole(asset)
     except InputError:
         return False
-    found = {key: value for key, value in provenance.inputs.items() if key != PLACE}
-    return found == inputs and provenance.generator == generator
+
+
+def _is_whole(asset: Asset) -> bool:
+    """Whether every file is there that a build writes beside `asset.json`."""
+    try:
+        root = ElementTree.parse(asset.model_path).getroot()
+    except (OSError, ElementTree.ParseError):
+        return False
+    files = [element.attrib["file"] for element in root.iter() if "file" in element.attrib]
+    if asset.kind == "rigid":
+        files.append(GRASPS_FILE)  # also where the gripper can hold it nowhere
+    if OVERRIDE in asset.provenance.inputs:
+        files.append(MEASURED_FILE)
+    return all((asset.folder / file).is_file() for file in files)
 
 
 def require_writable(out: Path) -> None:

@@ -65,6 +65,27 @@ def place(file: Path, folder: Path) -> str:
     return hashlib.sha256(path.as_posix().encode("utf-8", "surrogateescape")).hexdigest()[:16]
 
 
+def check_source(folder: Path, source: str) -> None:
+    """Refuse to replace an asset by that of another source which has the same name.
+
+    Args:
+      folder: Where the asset is to be.
+      source: What the provenance of such assets says.
+
+    Raises:
+      InputError: The asset that is there came from another source.
+    """
+    try:
+        provenance = read_asset(folder).provenance
+    except InputError:
+        return
+    if provenance.source != source:
+        raise InputError(
+            f"{folder}: was built from another source, {provenance.item} of {provenance.source}; "
+            f"expected an asset of {source}, so name another --out, or remove that asset"
+        )
+
+
 def check_origin(folder: Path, file: Path, source: str, inputs: dict[str, str]) -> None:
     """Refuse to replace an asset by that of another file which has the same name.
 

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from asset_pipeline.build.data_set import require_writable, up_to_date
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
+from asset_pipeline.build.replaceable import check_source
 from asset_pipeline.catalogue import instance
 from manipose_mj.assets import categories as catalogue
 from manipose_mj.assets.categories import CATALOGUE
+from manipose_mj.assets.inventory import BUILT_IN
 from manipose_mj.errors import InputError, unknown_name
 
 
@@ -68,10 +70,15 @@ def build_catalogue(
 
 
 def build_instance(category: str, index: int, code: str, folder: Path, target: Path) -> bool:
-    """Build one object into `target`, and return True, unless `folder` is of the same code."""
+    """Build one object into `target`, and return True, unless `folder` is of the same code.
+
+    Raises:
+      InputError: `folder` is the asset of another source.
+    """
     module = CATALOGUE[category].module
     if up_to_date(folder, {instance.CODE: code}, module):
         return False
+    check_source(folder, BUILT_IN)
     instance.build(category, index, target)
     return True
 

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
+import tests.asset_pipeline.labelled_assets as made
 import tests.asset_pipeline.scan_files as files
-from asset_pipeline.build.data_set import build
+from asset_pipeline.build.data_set import build, up_to_date
 from asset_pipeline.build.pool import BuildJob, run_jobs
 from asset_pipeline.build.workers.limited_call import Limits
 from asset_pipeline.catalogue.parallel_build import build_catalogue
@@ -128,6 +129,22 @@ def test_time_limit_is_a_failure_of_that_object(uninterrupted, tmp_path):
     assert result.status == "failed" and "time limit of 0.1 s" in result.reason
     assert str(scans) in result.reason and "\n" not in result.reason
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "lost", ["model.xml", "grasps.json", "meshes/block_visual_00.obj", "meshes/block_visual_00.png"]
+)
+def test_an_asset_that_lost_a_file_is_not_up_to_date(tmp_path, lost):
+    asset = made.block(tmp_path / "block")
+    provenance = asset.provenance
+    assert up_to_date(asset.folder, provenance.inputs, provenance.generator)
+    (asset.folder / lost).unlink()
+    assert not up_to_date(asset.folder, provenance.inputs, provenance.generator)
+
+
+def test_furniture_is_up_to_date_without_grasps(tmp_path):
+    asset = made.cupboard(tmp_path / "cupboard")
+    assert up_to_date(asset.folder, {}, asset.provenance.generator)
 
 
 def test_folders_of_the_dead_are_removed_and_those_of_the_living_are_not(tmp_path):

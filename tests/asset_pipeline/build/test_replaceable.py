@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
+import tests.asset_pipeline.labelled_assets as made
 import tests.asset_pipeline.scan_files as files
 from asset_pipeline.build.data_set import build
 from asset_pipeline.build.pool import BuildJob, run_jobs
 from asset_pipeline.build.replaceable import check_origin, check_replaceable, place
+from asset_pipeline.catalogue.parallel_build import build_catalogue
 from asset_pipeline.sources import meshes
 from asset_pipeline.sources.meshes import MeshOptions
 from manipose_mj.assets.asset_json import read_asset
@@ -152,6 +154,24 @@ def test_the_asset_of_another_source_is_not_replaced(tmp_path):
         "google_scanned_objects", files.write_folder(tmp_path / "scans", content), tmp_path / "out"
     )
     assert "was built from another file, Blue_Box of " in _asset(tmp_path / "out", file)
+
+
+def test_data_sets_and_the_catalogue_do_not_replace_the_asset_of_another_source(tmp_path):
+    out = tmp_path / "out"
+    for name in ("Blue_Box", "box_003"):
+        made.block(out / name)
+    before = _content(out)
+    box = files.box((0.2, 0.25, 0.3))
+    content = {"Blue_Box/model.obj": files.obj(box), "Blue_Box/texture.png": files.image()}
+    scans = files.write_folder(tmp_path / "scans", content)
+    results = build("google_scanned_objects", scans, out) + build_catalogue(out, only=["box_003"])
+    for result, source in zip(
+        results, ("Google Scanned Objects", "procedural catalogue"), strict=True
+    ):
+        assert result.status == "failed" and "\n" not in result.reason
+        assert "was built from another source, block of test; expected" in result.reason
+        assert f"{result.folder}: " in result.reason and source in result.reason
+    assert _content(out) == before
 
 
 def test_an_asset_that_does_not_say_where_its_file_lay_is_replaced(tmp_path):
