@@ -12,6 +12,7 @@ from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
 CATALOGUE = "catalogue"
+LONGEST = 1e6  # that a scan may take [s]: eleven days
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Type = Literal["axial", "mirror", "functional"]
 _MESHES = "(meshes only)"
@@ -99,8 +100,10 @@ def build_assets(
                 raise unknown_name("source", source, [CATALOGUE, *SOURCES])
             if path is None or out is None:
                 raise InputError(f"{source} needs the PATH of its files and --out DIR")
-            if not limit_s > 0:
-                raise InputError(f"--limit-s is {limit_s:g}; expected seconds, more than 0")
+            if not 0 < limit_s <= LONGEST:
+                raise InputError(
+                    f"--limit-s is {limit_s:g}; expected seconds, more than 0 and at most {LONGEST:g}"
+                )
             limits = Limits(seconds=limit_s)
             results = build(
                 source,

@@ -51,6 +51,17 @@ def test_a_picture_of_no_seed_leaves_no_file(tmp_path, capsys):
     assert not out.exists()
 
 
+@pytest.mark.parametrize("limit", ["inf", "nan", "1e10", "0"])
+def test_a_time_limit_is_one_that_can_be_waited_for(limit, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    command = ["assets", "build", "ycb", ".", "--out", "built", "--jobs", "1", "--limit-s", limit]
+    assert main(command) == EXIT_INPUT
+    assert complaint(capsys) == (
+        f"--limit-s is {float(limit):g}; expected seconds, more than 0 and at most 1e+06"
+    )
+    assert not list(tmp_path.iterdir())
+
+
 SERVERS = "servers of methods have addresses with ws:// or wss://"
 
 

@@ -137,7 +137,8 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
     """The entries as plain data, unchecked but for being mappings of known objects.
 
     Raises:
-      InputError: The file is missing, not YAML, or not a mapping of mappings.
+      InputError: The file is missing, not YAML, or not a mapping of mappings; or a key stands twice, or a value
+        holds itself.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -156,7 +157,7 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
         return {}
     if not isinstance(document, dict):
         raise InputError(f"{path}: holds {kind_of(document)}; expected objects' names with entries")
-    _refuse_repeats(root, path, "an entry")
+    _check_nodes(root, path, "an entry")
     for name, entry in document.items():
         if not isinstance(name, str):
             raise InputError(f'{path}: object {name!r} is no text; write the name in quotes: "..."')
@@ -167,8 +168,21 @@ def read_entries(path: Path) -> dict[str, dict[str, Any]]:
     return document
 
 
-def _refuse_repeats(node: yaml.Node, path: Path, what: str) -> None:
-    """Raises InputError where a key stands twice: YAML would take the last."""
+def _check_nodes(
+    node: yaml.Node, path: Path, what: str, inside: tuple[yaml.Node, ...] = ()
+) -> None:
+    """Check what YAML lets pass.
+
+    Raises:
+      InputError: A key stands twice, of which YAML would take the last; or a value holds itself, by its alias.
+    """
+    if any(node is each for each in inside):
+        line = node.start_mark.line + 1
+        raise InputError(f"{path}:{line}: what is named here holds itself; expected no such alias")
+    inside = (*inside, node)
+    if isinstance(node, yaml.SequenceNode):
+        for value in node.value:
+            _check_nodes(value, path, "a value", inside)
     if isinstance(node, yaml.MappingNode):
         seen: set[str] = set()
         for key, value in node.value:
@@ -176,7 +190,7 @@ def _refuse_repeats(node: yaml.Node, path: Path, what: str) -> None:
                 line = key.start_mark.line + 1
                 raise InputError(f"{path}:{line}: {key.value} has {what} already")
             seen.add(key.value)
-            _refuse_repeats(value, path, "a value")
+            _check_nodes(value, path, "a value", inside)
 
 
 def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
@@ -210,7 +224,6 @@ def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
             raise InputError(
                 f'{where}: parts: {part!r} is no text; write the name in quotes: "..."'
             )
-    digest = hashlib.sha256(json.dumps(entry, sort_keys=True, default=str).encode()).hexdigest()
     return Override(
         frame=_frame(where, {key: entry[key] for key in FRAME_KEYS if key in entry}),
         object_type=kind,
@@ -223,8 +236,14 @@ def parsed(path: Path, name: str, entry: dict[str, Any]) -> Override:
             for name, part in parts.items()
         },
         where=where,
-        digest=digest[:12],
+        # Last: by now all keys are known to be text, which can be sorted.
+        digest=_digest(entry),
     )
+
+
+def _digest(entry: dict[str, Any]) -> str:
+    text = json.dumps(entry, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def _part(where: str, entry: dict[str, Any]) -> PartOverride:

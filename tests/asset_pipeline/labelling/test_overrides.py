@@ -83,6 +83,7 @@ def test_the_documented_file_is_read_and_every_documented_field_is_known(tmp_pat
         ({"category": 7}, "category: is 7; expected a name"),
         ({"category": "../"}, "category: is '../'; expected a name"),
         ({"adjust": {"twist": [0, 0, 1]}}, "adjust: unknown field 'twist'"),
+        ({"adjust": {1: 2, "turn": [0, 0, 0]}}, "adjust: unknown field '1'"),
         ({"adjust": [0, 0, 1]}, "adjust: is a list; expected fields"),
         ({"parts": {"a": {}, 7: {}}}, "parts: 7 is no text; write the name in quotes"),
         ({"parts": {"lid": {"hinge": {}}}}, "parts: lid: unknown field 'hinge'"),
@@ -107,6 +108,8 @@ def test_wrong_fields_are_named_in_one_line(fields, message):
         ("a: {mass: 1}\na: {mass: 2}\n", "labels.yaml:2: a has an entry already"),
         ("a: {mass: 1, mass: 2}\n", "labels.yaml:1: mass has a value already"),
         ("a:\n  adjust: {turn: 1,\n    turn: 2}\n", "labels.yaml:3: turn has a value already"),
+        ("a: &x\n  parts: *x\n", "labels.yaml:1: what is named here holds itself"),
+        ("a:\n  origin: &x [0, 0, *x]\n", "labels.yaml:2: what is named here holds itself"),
         ("a: !!python/object:os.system {}\n", "labels.yaml:1: not valid YAML"),
     ],
 )
