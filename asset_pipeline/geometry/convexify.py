@@ -13,9 +13,11 @@ import coacd
 import numpy as np
 import trimesh
 from jaxtyping import Float
+from scipy.spatial import cKDTree
 
 from asset_pipeline.geometry.hull_reduction import hull_parts, reduced_hull
 from asset_pipeline.geometry.repair import closed, weld
+from asset_pipeline.geometry.surface_points import surface_points
 from manipose_mj.assets.geometry import Shape
 from manipose_mj.errors import InputError
 from manipose_mj.storage.cache_root import cache_root
@@ -37,7 +39,10 @@ class ConvexSettings:
       shell_parts: The same for thin-walled vessels, which must stay hollow.
       shell: Filling no more than this share of its hull, an object is one of those.
       max_vertices: Of one part.
-      convex_enough: With at least this share of its hull's volume an object is its hull.
+      convex_enough: With at least this share of its hull's volume an object is its hull, unless
+      hollow: somewhere its surface and the hull's are farther apart than this [m], as at a handle,
+        a hole or a well of small volume, or
+      hollow_share: than this share of the longest extent; the larger counts.
       hull_tolerance: How far a corner of that hull may lie outside the parts it is cut into [m].
       simplification: How far the surface may move before CoACD sees it [m]; time falls with the
         number of faces, and a scan's 16,000 say little that 2,000 do not.
@@ -51,6 +56,8 @@ class ConvexSettings:
     shell: float = 0.2
     max_vertices: int = 32
     convex_enough: float = 0.92
+    hollow: float = 0.010
+    hollow_share: float = 0.05
     hull_tolerance: float = 0.001
     simplification: float = 0.0007
     iterations: int = 40
@@ -63,7 +70,7 @@ def convexify(
 
     A mesh that can be closed goes to CoACD as it is (`preprocess_mode="off"`); CoACD's voxel
     remeshing, which costs minutes and thickens thin walls, is for those that cannot. An object that
-    is nearly its own convex hull becomes that hull, in a few slabs. CoACD's own reduction of the parts' vertices
+    is nearly its own convex hull, without handle, hole or well, becomes that hull, in a few slabs. CoACD's own reduction of the parts' vertices
     pulls their surfaces in by up to a centimetre; ours (`hull_reduction`) stays near 1 mm.
 
     Args:
@@ -147,7 +154,7 @@ def _decompose(mesh: trimesh.Trimesh, settings: ConvexSettings) -> list[trimesh.
             raise ValueError("no volume")
     except Exception:  # qhull's own type, for flat input
         raise InputError("mesh spans no volume; expected a solid object") from None
-    if solid is not None and solid.volume >= settings.convex_enough * whole.volume:
+    if solid is not None and _nearly_convex(solid, whole, settings):
         return hull_parts(
             np.asarray(whole.vertices), settings.max_vertices, tolerance=settings.hull_tolerance
         )
@@ -168,6 +175,25 @@ def _decompose(mesh: trimesh.Trimesh, settings: ConvexSettings) -> list[trimesh.
     parts = [reduced_hull(h, settings.max_vertices) for h in hulls if _volume(h) > MIN_PART_VOLUME]
     log.info("%d faces -> %d convex parts", len(source.faces), len(parts))
     return parts
+
+
+def _nearly_convex(
+    solid: trimesh.Trimesh, hull: trimesh.Trimesh, settings: ConvexSettings
+) -> bool:
+    """Whether the hull fills in neither much volume nor any deep hollow.
+
+    The solid's surface is deep below the hull in a well; the hull's is far from the solid over a wide hole in a plate.
+    """
+    if solid.volume < settings.convex_enough * hull.volume:
+        return False
+    allowed = max(settings.hollow, settings.hollow_share * float(max(hull.extents)))
+    spacing = allowed / 4
+    own, outer = surface_points(solid, spacing), surface_points(hull, spacing)
+    # The nearest of the points lies farther off than the nearest of the surface, by up to half a spacing's diagonal.
+    reach = allowed + 0.7 * spacing
+    depths, _ = cKDTree(outer).query(own, distance_upper_bound=reach)
+    gaps, _ = cKDTree(own).query(outer, distance_upper_bound=reach)
+    return bool(np.isfinite(depths).all() and np.isfinite(gaps).all())
 
 
 def _volume(points: Float[np.ndarray, "n 3"]) -> float:

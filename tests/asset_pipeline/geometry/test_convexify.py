@@ -101,6 +101,39 @@ def test_convex_object_is_one_hull_of_its_volume():
     assert radii.max() < 0.0425 and np.abs(hull.triangles_center).max() > 0.035
 
 
+def _toolbox() -> trimesh.Trimesh:
+    """A box of 300 x 100 x 200 mm with a carrying handle of 12 mm on top, which is open below."""
+    outer = trimesh.creation.box((0.1, 0.012, 0.04)).apply_translation((0, 0, 0.12))
+    inner = trimesh.creation.box((0.076, 0.1, 0.028)).apply_translation((0, 0, 0.114))
+    handle = trimesh.boolean.difference([outer, inner], engine="manifold")
+    return trimesh.boolean.union([trimesh.creation.box((0.3, 0.1, 0.2)), handle], engine="manifold")
+
+
+def _bored(extents, hole, shift=0.0) -> trimesh.Trimesh:
+    """A box with a square hole along z; `shift` [m] along z makes it a well."""
+    bore = trimesh.creation.box(hole).apply_translation((0, 0, shift))
+    return trimesh.boolean.difference([trimesh.creation.box(extents), bore], engine="manifold")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "free"),
+    [
+        (_toolbox(), (0, 0, 0.114)),  # in the handle
+        (_bored((0.2, 0.2, 0.02), (0.05, 0.05, 0.1)), (0, 0, 0)),
+        (_bored((0.08, 0.08, 0.1), (0.02, 0.02, 0.1), 0.03), (0, 0, 0.02)),
+    ],
+    ids=["toolbox", "plate", "pen holder"],
+)
+def test_handles_holes_and_wells_of_little_volume_stay_open(tmp_path, mesh, free):
+    assert mesh.volume > 0.92 * mesh.convex_hull.volume
+    assert _clear(convexify(mesh, cache=tmp_path), free, 0.005)
+
+
+def test_shallow_hollows_are_filled_by_the_hull(tmp_path):
+    dented = _bored((0.08, 0.08, 0.1), (0.03, 0.03, 0.016), 0.05)  # 8 mm deep
+    assert len(convexify(dented, cache=tmp_path)) == 1
+
+
 def test_few_points_are_kept_exactly():
     box = trimesh.creation.box(extents=[0.05, 0.06, 0.07])
     assert reduced_hull(np.asarray(box.vertices), 32).volume == pytest.approx(box.volume)
