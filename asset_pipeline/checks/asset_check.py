@@ -1,4 +1,7 @@
-"""Does a built asset behave? Each is loaded alone, dropped, and tested by what it then does."""
+"""Does a built asset behave? Each is loaded alone, dropped, and tested by what it then does.
+
+Beside that, its files must agree (`agreement_check`), and what is seen with what touches (`visual_check`).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import mujoco
 import numpy as np
 from joblib import Parallel, delayed
 
+from asset_pipeline.checks.agreement_check import body_failures, joint_failures
 from asset_pipeline.checks.visual_check import visual_failures
 from asset_pipeline.geometry.settling import SETTLE_TIME, dropped, speeds
 from asset_pipeline.geometry.stable_poses import tilt
@@ -120,7 +124,7 @@ def check_asset(folder: Path) -> CheckResult:
         return CheckResult(folder.name, (f"{folder}: model.xml does not compile: {line}",))
     checked = _check_articulated if asset.kind == "articulated" else _check_rigid
     result = checked(asset, model)
-    return replace(result, failures=(*result.failures, *unlike))
+    return replace(result, failures=(*result.failures, *body_failures(asset, model), *unlike))
 
 
 def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
@@ -157,6 +161,9 @@ def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
 def _check_articulated(asset: Asset, model: mujoco.MjModel) -> CheckResult:
     failures = _shape_failures(model)
     parts, vertices = _collision_parts(model)
+    counts = {"parts": parts, "part_vertices": vertices, "grasps": 0}
+    if unlike := joint_failures(asset, model):  # what moves is then not what asset.json speaks of
+        return CheckResult(asset.folder.name, (*failures, *unlike), **counts)
     data = mujoco.MjData(model)
     while data.time < LIMITS.shut_time:
         mujoco.mj_step(model, data)
@@ -173,9 +180,7 @@ def _check_articulated(asset: Asset, model: mujoco.MjModel) -> CheckResult:
                 f"part {part.name!r} opens to {reached:.3f} of {high:.3f} under "
                 f"{LIMITS.force:g} N or {LIMITS.torque:g} N m"
             )
-    return CheckResult(
-        asset.folder.name, tuple(failures), parts=parts, part_vertices=vertices, grasps=0
-    )
+    return CheckResult(asset.folder.name, tuple(failures), **counts)
 
 
 def _pull(model: mujoco.MjModel, data: mujoco.MjData, joint: int, slides: bool) -> float:

@@ -177,9 +177,7 @@ def _decompose(mesh: trimesh.Trimesh, settings: ConvexSettings) -> list[trimesh.
     return parts
 
 
-def _nearly_convex(
-    solid: trimesh.Trimesh, hull: trimesh.Trimesh, settings: ConvexSettings
-) -> bool:
+def _nearly_convex(solid: trimesh.Trimesh, hull: trimesh.Trimesh, settings: ConvexSettings) -> bool:
     """Whether the hull fills in neither much volume nor any deep hollow.
 
     The solid's surface is deep below the hull in a well; the hull's is far from the solid over a wide hole in a plate.
