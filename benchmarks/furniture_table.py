@@ -146,8 +146,8 @@ def config_for(asset: Asset, part: MovingPart, verb: str) -> EnvConfig:
 
 
 def handled_parts(asset: Asset) -> list[MovingPart]:
-    """The parts that are played."""
-    return [part for part in asset.parts if part.handle is not None]
+    """The parts that are played: no task is about a sliding door."""
+    return [p for p in asset.parts if p.handle is not None and kind_of(p) != "sliding door"]
 
 
 def listed(asset: Asset, *, played: bool) -> list[str]:

@@ -130,7 +130,10 @@ def _joint(link: ScanLink, mass: MassProperties) -> tuple[Joint | None, float]:
     """The joint, and the share of the part's weight that springs carry."""
     if link.joint is None or link.role is None:
         return None, 0.0
-    joint, resistance = link.joint, RESISTANCE[link.role]
+    joint = link.joint
+    # A door that slides resists as a drawer does: the figures of the others are those of hinges.
+    sliding_door = link.role == "door" and joint.kind == "slide"
+    resistance = RESISTANCE["drawer" if sliding_door else link.role]
     weight = GRAVITY * mass.mass
     if joint.kind == "slide":
         load = weight * abs(joint.axis[2])
@@ -169,7 +172,7 @@ def _excluded(
 def _outwards(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "3"]:
     """Off the part's face: a drawer's way out; a panel's normal, away from the middle of the base."""
     assert link.joint is not None
-    if link.joint.kind == "slide":
+    if link.role == "drawer":
         axis = int(np.abs(link.joint.axis).argmax())
         sign = np.sign(link.joint.axis[axis])
     else:

@@ -199,7 +199,8 @@ def _shut(
     Of a door's or a drawer's two limits, the one where link and base share the smaller bounding box is
     shut; of the others, and where the boxes are alike, the lower one. A door that is drawn well between them is shut
     as drawn, and so is a drawer whose box is smaller there than at both; then a drawer opens towards the front, and a
-    door the way that takes it farther out of the base. So does a door without limits, by a quarter turn.
+    door the way that takes it farther out of the base. So does a door without limits, by a quarter turn. A sliding
+    door stays in front of the base: where the boxes are alike, the limit nearer to where it is drawn is shut.
 
     Raises:
       InputError: It would turn by more than a whole turn.
@@ -225,16 +226,21 @@ def _shut(
     elif link.role in ("door", "drawer", "lid"):
         least = _SMALLER * min(box(lower), box(upper))
         if min(-lower, upper) > _BOTH_SIDES * (upper - lower) and (
-            kind == "hinge" or box(0.0) < least
+            link.role != "drawer" or box(0.0) < least
         ):
             log.warning(
                 "link %r moves to both sides of where it is drawn: taken to be shut there",
                 link.name,
             )
-            out = box(upper) - box(lower) if kind == "hinge" else -axis[0]
+            out = -axis[0] if link.role == "drawer" else box(upper) - box(lower)
             start, sign = 0.0, 1.0 if out >= 0 else -1.0
             lower, upper = (0.0, upper) if sign > 0 else (lower, 0.0)
-        elif box(upper) < _SMALLER * box(lower):
+        elif box(upper) < _SMALLER * box(lower) or (
+            kind == "slide"
+            and link.role == "door"
+            and -lower > upper
+            and box(lower) >= _SMALLER * box(upper)
+        ):
             start, sign = upper, -1.0
         if box(0.0) < _SMALLER * box(start):
             log.warning(

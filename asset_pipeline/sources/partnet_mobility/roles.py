@@ -35,7 +35,9 @@ def named_role(slides: bool, link: str, parts: Iterable[str]) -> LinkRole | None
     """
     roles = _SLIDES if slides else _TURNS
     texts = [re.findall(r"[a-z]+", text.lower()) for text in (link, " ".join(parts))]
-    if slides and any("door" in words for words in texts):
+    if slides and "door" in texts[0]:
+        return "door"
+    if slides and "door" in texts[1]:
         return None
     found: list[LinkRole] = [
         role for words in texts for word, role in roles.items() if word in words

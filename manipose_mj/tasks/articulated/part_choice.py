@@ -8,8 +8,10 @@ from typing import Literal
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.errors import InputError, unknown_name
 
-PartKind = Literal["drawer", "door", "flap"]
+PartKind = Literal["drawer", "door", "flap", "sliding door"]
 Level = Literal["top", "middle", "bottom"]
+# A drawer comes out as its handle does: the cosine between the two. A sliding door's is 0.
+_COMES_OUT = 0.3
 _ONE_ROW = 0.03  # handles whose heights differ by less are at one level [m]
 # How many rows of a kind there must be for a level to mean something.
 _LEAST: dict[Level, int] = {"top": 1, "middle": 3, "bottom": 1}
@@ -21,7 +23,7 @@ class PartChoice:
 
     Attributes:
       kinds: What it may be, the best first: a drawer slides, a door turns about the vertical, a flap
-        about a level axis.
+        about a level axis. No task is about a sliding door, which slides along its own front.
       level: Which rows of those, by the height of their handles; None: all.
       any_layout: Whether the middle of one or two rows means something too: the upper one.
     """
@@ -41,9 +43,11 @@ class PartChoice:
 
 
 def kind_of(part: MovingPart) -> PartKind:
-    """Drawer, door or flap, by the part's joint."""
+    """Drawer, door or flap, by the part's joint; a sliding door, where it slides across its handle's way out."""
     if part.joint.kind == "slide":
-        return "drawer"
+        handle = part.handle
+        aside = handle is not None and abs(handle.rotation[:, 1] @ part.joint.axis) < _COMES_OUT
+        return "sliding door" if aside else "drawer"
     return "door" if abs(part.joint.axis[2]) > 0.7 else "flap"
 
 

@@ -21,7 +21,8 @@ SLIDES, TURNS = True, False
         (SLIDES, "button", ["knob"], "button"),
         (SLIDES, "drawer", ["drawer_front", "knob"], "drawer"),
         (SLIDES, "tray", ["tray"], "tray"),
-        (SLIDES, "translation_door", ["cabinet_door_surface"], None),
+        (SLIDES, "translation_door", ["cabinet_door_surface", "knob"], "door"),
+        (SLIDES, "", ["cabinet_door_surface"], None),
     ],
 )
 def test_names_tell_the_role(slides, link, parts, role):

@@ -100,6 +100,15 @@ def test_a_part_that_is_not_there_is_refused_with_those_that_are():
     assert kind_of(catalogue.load("oven", 7).part("door")) == "flap"
 
 
+def test_a_sliding_door_is_no_drawer():
+    asset = catalogue.load("cabinet", 0)
+    drawer = asset.part("top_drawer")
+    aside = replace(drawer, joint=replace(drawer.joint, axis=np.array([0.0, 1, 0])))
+    assert (kind_of(drawer), kind_of(aside)) == ("drawer", "sliding door")
+    with pytest.raises(InputError, match=r"its parts: top_drawer \(sliding door\)"):
+        possible_parts(replace(asset, parts=(aside,)), PartChoice(("drawer", "door")), hollow=False)
+
+
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("part", OPENABLES)
 def test_open_is_met_from_nine_tenths_of_the_range_on(part):
