@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from glob import escape
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -22,7 +23,7 @@ from asset_pipeline.sources.articulated_scan import ArticulatedScan, ScanLink
 from asset_pipeline.sources.partnet_mobility.links import normalised_links, placed_links
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_links
 from asset_pipeline.sources.partnet_mobility.sizes import BODIES, SIZES, TABLE, CategorySize
-from asset_pipeline.sources.partnet_mobility.urdf import read_urdf
+from asset_pipeline.sources.partnet_mobility.urdf import mesh_files, read_urdf
 from asset_pipeline.sources.scan import ScanItem
 from manipose_mj.assets.asset import Provenance
 from manipose_mj.errors import InputError
@@ -76,8 +77,20 @@ def opened(item: ScanItem) -> Iterator[ArticulatedScan]:
 
 def _members(item: ScanItem) -> list[PurePosixPath]:
     folder = PurePosixPath(item.member).parent
-    patterns = [str(folder / name) for name in (*FILES, "textured_objs/*", "images/*")]
-    return [PurePosixPath(member) for member in collection.find(item.path, patterns)]
+    meshes = [folder / file for file in _named_meshes(item)]
+    names = [str(folder / name) for name in (*FILES, "textured_objs/*", "images/*")]
+    libraries = {f"{escape(str(mesh.parent))}/*.mtl" for mesh in meshes}
+    found = map(PurePosixPath, collection.find(item.path, [*names, *sorted(libraries)]))
+    return sorted({*found, *meshes})
+
+
+def _named_meshes(item: ScanItem) -> list[PurePosixPath]:
+    """The meshes that the URDF names, wherever in its folder; none where it cannot be read, which `_scan` tells."""
+    try:
+        with collection.unpacked(item, [PurePosixPath(item.member)]) as root:
+            return mesh_files(root / item.member)
+    except InputError:
+        return []
 
 
 def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:

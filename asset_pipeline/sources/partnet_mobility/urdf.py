@@ -106,6 +106,16 @@ def read_urdf(path: Path) -> Urdf:
     return _tree(path, visuals, joints)
 
 
+def mesh_files(path: Path) -> list[PurePosixPath]:
+    """The files that the visuals of a URDF name, relative to its folder, sorted.
+
+    Raises:
+      InputError: The file is missing, too large or no plain XML; or a visual is not as `read_urdf` expects.
+    """
+    links = _parse(path).findall("link")
+    return sorted({_visual(path, v).file for link in links for v in link.findall("visual")})
+
+
 def _tree(
     path: Path, visuals: dict[str, tuple[UrdfMesh, ...]], joints: dict[str, UrdfJoint]
 ) -> Urdf:
