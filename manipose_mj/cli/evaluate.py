@@ -203,7 +203,7 @@ def run_and_report(config, *, resume: bool) -> int:
         console.print(line, soft_wrap=True)
     console.print(f"report: {report}", soft_wrap=True)
     # Where nothing could be played, nothing was found out.
-    return int(all(result.failure == "error" for result in results))
+    return int(bool(results) and all(result.failure == "error" for result in results))
 
 
 def common_reasons(results: Sequence[EpisodeResult], out: Path) -> list[str]:
