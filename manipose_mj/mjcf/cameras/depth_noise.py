@@ -62,22 +62,23 @@ class StructuredLight:
 
         for name in ("disparity_step", "baseline", "near", "noise"):
             value = getattr(self, name)
-            require(name, _is_number(value) and 0 <= value < np.inf, "0 or more")
-        focal = _is_number(self.focal) and 0 < self.focal < np.inf
+            require(name, is_number(value) and 0 <= value < np.inf, "0 or more")
+        focal = is_number(self.focal) and 0 < self.focal < np.inf
         require("focal", focal, "more than 0 pixels")
-        speckle = _is_number(self.speckle) and 0 <= self.speckle <= 1
+        speckle = is_number(self.speckle) and 0 <= self.speckle <= 1
         require("speckle", speckle, "a share, 0 to 1")
-        far = _is_number(self.far) and self.near < self.far
+        far = is_number(self.far) and self.near < self.far
         require("far", far, f"more than near, {self.near}")
         require("grazing", _is_ramp(self.grazing), "two angles [rad], 0 or more, the second larger")
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether it is a real number, of Python or NumPy."""
     return isinstance(value, Real)
 
 
 def _is_ramp(value: Any) -> bool:
-    if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(_is_number, value)):
+    if not isinstance(value, tuple | list) or len(value) != 2 or not all(map(is_number, value)):
         return False
     return 0 <= value[0] < value[1] < np.inf
 

@@ -9,9 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.cameras.depth_noise import is_number
 from manipose_mj.poses import compose, rotation_about
-
-_NUMBERS = (int, float, np.integer, np.floating)
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class FixedError:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not isinstance(value, _NUMBERS) or not 0 <= value < np.inf:
+            if not is_number(value) or not 0 <= value < np.inf:
                 raise InputError(f"error: {name} is {value!r}; expected 0 or more")
 
     def __bool__(self) -> bool:

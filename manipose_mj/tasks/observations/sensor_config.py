@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight
+from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight, is_number
 from manipose_mj.mjcf.cameras.pictures import ENGINES, Engine
 from manipose_mj.tasks.observations.fixed_error import FixedError
 
 MAX_PIXELS = 8192  # along a side of a picture
 DEPTH_MODELS: dict[str, StructuredLight | None] = {"ideal": None, "structured_light": KINECT}
-_NUMBERS = (int, float, np.integer, np.floating)
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class CameraView:
                 f"camera {self.name!r}: position {self.position} and target {self.target}; "
                 "expected two different points of three finite coordinates"
             )
-        if not isinstance(self.fovy, _NUMBERS) or not 0 < self.fovy < 180:
+        if not is_number(self.fovy) or not 0 < self.fovy < 180:
             raise InputError(f"camera {self.name!r}: fovy {self.fovy!r} deg; expected 0 to 180")
 
 
@@ -73,7 +72,7 @@ class PoseNoise:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not isinstance(value, _NUMBERS) or not 0 <= value < np.inf:
+            if not is_number(value) or not 0 <= value < np.inf:
                 raise InputError(f"pose noise: {name} is {value!r}; expected 0 or more")
 
 
