@@ -80,6 +80,7 @@ class Batch:
         import warp as wp  # pyright: ignore[reportMissingImports]
 
         from asset_pipeline.grasp_survival import warp_kernels
+        from manipose_mj.batch.kernels.stepping import Stepper
 
         self._mjw, self._wp, self._kernels = mujoco_warp, wp, warp_kernels
         self._trial, self.worlds, self._room = trial, worlds, room
@@ -90,6 +91,7 @@ class Batch:
         self._data = mujoco_warp.make_data(
             host, nworld=worlds, naconmax=room.contacts * worlds, njmax=room.rows
         )
+        self._stepper = Stepper(self._model, self._data)
         self._model.opt.gravity = wp.zeros(worlds, dtype=wp.vec3)
         friction = np.repeat(host.geom_friction[None].astype(np.float32), worlds, axis=0)
         self._model.geom_friction = wp.array(friction, dtype=wp.vec3)
@@ -172,7 +174,7 @@ class Batch:
 
     def _once(self) -> None:
         wp, data, kernels = self._wp, self._data, self._kernels
-        self._mjw.step(self._model, data)
+        self._stepper.step()
         found = [data.nacon, data.contact.worldid, data.contact.dist, self._states]
         wp.launch(kernels.find_touching, data.naconmax, inputs=found)
         self._go_on()

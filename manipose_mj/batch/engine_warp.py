@@ -16,6 +16,7 @@ from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch.capacity import Capacity, probe
 from manipose_mj.batch.kernels import warp_kernels as kernels
 from manipose_mj.batch.kernels.kernels_ahead import begin_compiling
+from manipose_mj.batch.kernels.stepping import Stepper
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.render_warp import WarpRenderer
 from manipose_mj.batch.row_fields import RowFields
@@ -81,6 +82,7 @@ class WarpEngine:
             self._require_room(model)
             self._data = self._made(model, worlds)
             self._tables = self._fields.to_device(self._model, self._data, worlds)
+            self._stepper = Stepper(self._model, self._data)
             self._prepare_robot(model)
             self._rows = wp.full(worlds, -1, dtype=int)
             self._changed = wp.zeros(worlds, dtype=int)
@@ -196,8 +198,8 @@ class WarpEngine:
 
     def _step(self, targets: Any) -> None:
         """The physics steps of one control step; nothing is read back from the device."""
-        model, data, servos = self._model, self._data, self._servos
-        mujoco_warp.step1(model, data)
+        data, servos, stepper = self._data, self._servos, self._stepper
+        stepper.step1()
         for substep in range(self._pool.layout.substeps):
             wp.launch(
                 kernels.limit_set_points,
@@ -221,8 +223,9 @@ class WarpEngine:
                 outputs=[data.ctrl],
             )
             # The second half of a step, then the first of the next, as the CPU's environment steps.
-            mujoco_warp.step2(model, data)
-            mujoco_warp.step1(model, data)
+            stepper.step2()
+            stepper.step1()
+        mujoco_warp.camlight(self._model, data)
 
     def _take_starts(self, rows: Any) -> None:
         """Where a world's start is another one than before, give the model the fields of that."""
@@ -340,6 +343,7 @@ def _likeness(model: mujoco.MjModel) -> str:
             *(opt.enableflags, opt.disableflags),
             sorted(set(zip(model.geom_type.tolist(), model.geom_condim.tolist(), strict=True))),
             sorted(set(model.jnt_type.tolist())),
+            (model.body_parentid.tolist(), model.ngeom),
         )
     )
 

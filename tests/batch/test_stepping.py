@@ -1,0 +1,241 @@
+"""Steps with few kernels against MuJoCo Warp's own; on Warp's CPU device where there is no GPU, if the libraries are there."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+mjw = pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
+wp = pytest.importorskip("warp", reason='needs pip install -e ".[gpu]"')
+
+from manipose_mj.batch.kernels.stepping import Stepper  # noqa: E402
+
+pytestmark = pytest.mark.full  # it compiles for half a minute
+WORLDS = 8
+# An arm with friction, limits and a tendon, and free bodies whose contacts have 3, 4 and 6 rows.
+SCENE = """
+<mujoco>
+  <option timestep="0.002" cone="{cone}" impratio="{impratio}" integrator="{integrator}"/>
+  <worldbody>
+    <geom type="plane" size="2 2 .1"/>
+    <body pos="0 0 .1"><freejoint/><geom type="box" size=".05 .03 .02" condim="4" friction="1 .02 .001"/></body>
+    <body pos=".02 .01 .2">
+      <freejoint/><geom type="capsule" size=".03 .05" condim="6" friction=".6 .01 .001"/>
+    </body>
+    <body pos=".3 0 .3">
+      <joint name="shoulder" type="hinge" axis="0 1 0" range="-.3 .3" limited="true" frictionloss=".2"/>
+      <geom type="capsule" fromto="0 0 0 -.35 0 -.1" size=".02" condim="3"/>
+      <body pos="-.35 0 -.1">
+        <joint name="elbow" type="hinge" axis="0 1 0" damping=".1" frictionloss=".05"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -.25" size=".02"/>
+      </body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="both"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="-.5"/></fixed></tendon>
+  <equality><joint joint1="shoulder" joint2="elbow" polycoef="0 .1 0 0 0" active="{equality}"/></equality>
+  <actuator><position tendon="both" kp="3" kv=".2"/></actuator>
+</mujoco>
+"""
+BOX = '<body pos="{x} {y} {z}"><freejoint/><geom type="box" size=".05 .04 .03" condim="{rows}"/></body>'
+
+
+def scene(cone="elliptic", impratio=100.0, integrator="implicitfast", equality="false"):
+    text = SCENE.format(cone=cone, impratio=impratio, integrator=integrator, equality=equality)
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def heap():
+    """Five boxes on one another: more rows than a warp has lanes."""
+    places = [(0, 0, 0.03), (0.02, 0, 0.09), (0, 0.01, 0.15), (0.2, 0, 0.03), (0.1, 0, 0.21)]
+    boxes = "".join(
+        BOX.format(x=x, y=y, z=z, rows=(3, 4, 6)[i % 3]) for i, (x, y, z) in enumerate(places)
+    )
+    return mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep=".002" cone="elliptic" impratio="10"/>'
+        f'<worldbody><geom type="plane" size="2 2 .1"/>{boxes}</worldbody></mujoco>'
+    )
+
+
+class Pair:
+    """The same worlds twice: stepped by MuJoCo Warp, and by `Stepper`."""
+
+    def __init__(self, host, worlds=WORLDS, speed=1.0):
+        with wp.ScopedDevice("cpu"):
+            self.model = mjw.put_model(host)
+            self.model.opt.warn_overflow = 0
+            self.theirs, self.ours = (
+                mjw.make_data(host, nworld=worlds, naconmax=80 * worlds, njmax=300)
+                for _ in range(2)
+            )
+            rng = np.random.default_rng(0)
+            velocities = rng.normal(0.0, speed, (worlds, host.nv)).astype(np.float32)
+            for data in (self.theirs, self.ours):
+                data.qpos.assign(np.tile(host.qpos0, (worlds, 1)).astype(np.float32))
+                data.qvel.assign(velocities)
+                data.ctrl.assign(np.full((worlds, host.nu), 0.3, np.float32))
+            self.stepper = Stepper(self.model, self.ours)
+
+    def step(self):
+        """One step of both from the same states."""
+        with wp.ScopedDevice("cpu"):
+            for name in ("qpos", "qvel", "qacc_warmstart"):
+                wp.copy(getattr(self.ours, name), getattr(self.theirs, name))
+            mjw.step(self.model, self.theirs)
+            self.stepper.step()
+
+    def apart(self, name):
+        """The largest difference, relative to what the largest is in that world."""
+        expected, found = (getattr(data, name).numpy() for data in (self.theirs, self.ours))
+        largest = np.maximum(np.abs(expected).max(axis=1), 1.0)
+        return (np.abs(expected - found).max(axis=1) / largest).max()
+
+
+def objective(model, data, world, acceleration):
+    """What accelerations minimise, by MuJoCo's documentation ("Computation"), in 64 bits; rows are `data`'s."""
+    count, nv, a = data.nefc.numpy()[world], model.nv, acceleration.astype(float)
+    inertia, packed = np.zeros((nv, nv)), data.M.numpy()[world]
+    for i in range(nv):
+        begin, length = model.M_rowadr.numpy()[i], model.M_rownnz.numpy()[i]
+        columns = model.M_colind.numpy()[begin : begin + length]
+        inertia[i, columns] = inertia[columns, i] = packed[begin : begin + length]
+    efc = data.efc
+    stiff, loss, kinds = (
+        array.numpy()[world, :count].astype(float) for array in (efc.D, efc.frictionloss, efc.type)
+    )
+    x = efc.J.numpy()[world, :count, :nv].astype(float) @ a - efc.aref.numpy()[world, :count]
+    total = 0.5 * a @ inertia @ a - a @ data.qfrc_smooth.numpy()[world]
+    equalities = data.ne.numpy()[world]
+    frictions = equalities + data.nf.numpy()[world]
+    cones = kinds == int(mujoco.mjtConstraint.mjCNSTR_CONTACT_ELLIPTIC)
+    springs = 0.5 * stiff * x**2
+    total += springs[:equalities].sum()
+    for r in range(equalities, frictions):
+        reach = loss[r] / stiff[r]
+        inside = abs(x[r]) <= reach
+        total += springs[r] if inside else loss[r] * (abs(x[r]) - 0.5 * reach)
+    others = np.arange(count) >= frictions
+    total += springs[others & ~cones & (x < 0)].sum()
+    impratio = float(model.opt.impratio_invsqrt.numpy()[0])
+    for contact in np.unique(efc.id.numpy()[world, :count][cones]):
+        rows = data.contact.dim.numpy()[contact]
+        first = data.contact.efc_address.numpy()[contact, 0]
+        friction = data.contact.friction.numpy()[contact].astype(float)[: rows - 1]
+        mu = friction[0] * impratio
+        normal = mu * x[first]
+        tangent = np.linalg.norm(friction * x[first + 1 : first + rows])
+        if normal >= mu * tangent:
+            continue
+        if mu * normal + tangent <= 0.0:
+            total += springs[first : first + rows].sum()
+        else:
+            total += 0.5 * stiff[first] / (mu**2 * (1 + mu**2)) * (normal - mu * tangent) ** 2
+    return total, np.trace(inertia)
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        scene(),
+        scene(impratio=1.0, integrator="Euler", equality="true"),
+        scene(cone="pyramidal", impratio=1.0),
+        heap(),
+    ],
+    ids=["elliptic", "equality", "pyramids", "heap"],
+)
+def test_worlds_are_stepped_as_by_mujoco_warp(host):
+    pair = Pair(host)
+    assert pair.stepper.fused
+    rows, iterations = 0, 0
+    tolerance = float(pair.model.opt.tolerance.numpy()[0])
+    for step in range(150):
+        pair.step()
+        rows = max(rows, pair.ours.nefc.numpy().max())
+        iterations = max(iterations, pair.ours.solver_niter.numpy().max())
+        assert pair.apart("qvel") < 1e-3
+        assert (pair.ours.nacon.numpy() == pair.theirs.nacon.numpy()).all()
+        for world in range(WORLDS if step % 5 == 0 else 0):
+            expected, found = (
+                objective(pair.model, pair.theirs, world, data.qacc.numpy()[world])
+                for data in (pair.theirs, pair.ours)
+            )
+            # Both stop where less than the tolerance is to be gained; theirs may be the better one by that.
+            assert found[0] <= expected[0] + 2.0 * tolerance * found[1]
+    assert rows > 12 and iterations > 2
+    assert not pair.ours.overflow.numpy().any()
+
+
+def test_a_heap_has_more_rows_than_lanes():
+    pair = Pair(heap())
+    for _ in range(150):
+        pair.step()
+    assert pair.ours.nefc.numpy().max() > 64
+
+
+def test_forces_and_states_of_rows_are_told():
+    pair = Pair(scene())
+    for _ in range(150):
+        pair.step()
+    counts = pair.theirs.nefc.numpy()
+    for world, count in enumerate(counts):
+        # Rows of contacts may stand in another order.
+        expected, found = (
+            np.sort(data.efc.force.numpy()[world, :count]) for data in (pair.theirs, pair.ours)
+        )
+        np.testing.assert_allclose(found, expected, atol=2e-3)
+        states = [
+            np.sort(data.efc.state.numpy()[world, :count]) for data in (pair.theirs, pair.ours)
+        ]
+        assert (states[0] == states[1]).all()
+    assert pair.apart("qfrc_smooth") < 1e-5
+
+
+def test_a_world_without_constraints_falls():
+    box = BOX.format(x=0, y=0, z=1, rows=3)
+    host = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom type="plane" size="2 2 .1"/>{box}</worldbody></mujoco>'
+    )
+    pair = Pair(host, worlds=2)
+    pair.step()
+    assert pair.stepper.fused and not pair.ours.nefc.numpy().any()
+    assert pair.ours.qacc.numpy()[:, 2] == pytest.approx(-9.81, abs=1e-4)
+    assert pair.apart("qacc") < 1e-5
+
+
+def test_a_world_that_is_no_number_spares_the_others_and_ends():
+    pair = Pair(scene())
+    for _ in range(40):
+        pair.step()
+    broken = pair.theirs.qvel.numpy().copy()
+    broken[3, 0] = np.nan
+    pair.theirs.qvel.assign(broken)
+    pair.step()
+    found = pair.ours.qacc.numpy()
+    assert np.isnan(found[3]).any()
+    sound = np.arange(WORLDS) != 3
+    assert np.isfinite(found[sound]).all()
+    np.testing.assert_allclose(found[sound], pair.theirs.qacc.numpy()[sound], rtol=0, atol=1.0)
+
+
+def test_limits_of_iterations_are_told():
+    pair = Pair(scene())
+    for _ in range(60):
+        pair.step()
+    pair.model.opt.iterations = 1
+    pair.theirs.qvel.assign(pair.theirs.qvel.numpy() + np.float32(0.5))
+    pair.step()
+    flagged = pair.ours.overflow.numpy() & int(mjw.OverflowType.ITERATIONS)
+    assert flagged.any()
+    assert (pair.ours.solver_niter.numpy() <= 1).all()
+
+
+def test_what_the_kernels_cannot_do_is_left_to_mujoco_warp():
+    boxes = "".join(BOX.format(x=0.2 * i, y=0, z=0.03, rows=3) for i in range(6))
+    large = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom type="plane" size="2 2 .1"/>{boxes}</worldbody></mujoco>'
+    )
+    pair = Pair(large, worlds=2)
+    assert not pair.stepper.fused
+    for _ in range(5):
+        pair.step()
+    assert pair.apart("qvel") < 1e-5
