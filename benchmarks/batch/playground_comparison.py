@@ -1,6 +1,6 @@
 """Print how fast batched worlds step beside MuJoCo Playground's `PandaPickCube` on MuJoCo Warp, in one process, in turns.
 
-python benchmarks/batch/playground_comparison.py [--worlds 8192 32768] [--objects box_000]
+python benchmarks/batch/playground_comparison.py [--worlds 8192 32768] [--objects box_000] [--modes WARP ...] [--pool FILE]
 
 Needs an NVIDIA GPU and `pip install playground==0.2.0`. Both make ten physics steps of 2 ms in a control step, and random
 actions, each held for 25. Playground in its default configuration has room for the contacts of 2,048 worlds; its best is the
@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -58,6 +59,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--worlds", nargs="+", type=int, default=[8192, 32768])
     parser.add_argument("--objects", nargs="+", default=["box_000"])
+    parser.add_argument(
+        "--pool", type=Path, help="drawn starts of ours, as throughput.py writes them"
+    )
+    parser.add_argument("--modes", nargs="*", choices=MODES, default=MODES, help="of graphs")
+    parser.add_argument("--no-mjx", action="store_true", help="leave out our scene stepped by MJX")
     parser.add_argument("--steps", type=int, default=50, help="control steps in a turn")
     arguments = parser.parse_args()
     compile_at_once_on_gpus()
@@ -73,10 +79,12 @@ def main() -> None:
 
 def compare(count: int, arguments: argparse.Namespace) -> None:
     """Print the rows of so many worlds, and ours over the best of Playground's."""
-    makers: list[Callable[[], Runner]] = [lambda: ours(count, arguments.objects, arguments.steps)]
-    for mode in (None, *MODES):
+    source = arguments.pool or tuple(arguments.objects)
+    makers: list[Callable[[], Runner]] = [lambda: ours(count, source, arguments.steps)]
+    for mode in (None, *arguments.modes):
         makers.append(lambda mode=mode: playground(count, mode, arguments.steps))
-    makers.append(lambda: mjx_of_ours(count, arguments.objects, arguments.steps))
+    if not arguments.no_mjx:
+        makers.append(lambda: mjx_of_ours(count, source, arguments.steps))
     runners, first = [], {}
     for make in makers:
         began = time.perf_counter()
@@ -116,26 +124,25 @@ def in_turns(runners: Sequence[Runner]) -> dict[str, float]:
     return {r.name: r.steps / statistics.median(seconds[r.name]) for r in runners}
 
 
-def ours(count: int, objects: Sequence[str], steps: int, engine: Any = "warp") -> Runner:
+def ours(count: int, source: Path | tuple[str, ...], steps: int, engine: Any = "warp") -> Runner:
     """Batched worlds with observations, reward, success and auto-reset."""
-    worlds, actions = worlds_and_actions(count, objects, steps, engine)
+    worlds, actions = worlds_and_actions(count, source, steps, engine)
     roll = jax.jit(lambda state: worlds.rollout(actions, state))
     state = worlds.reset(jax.random.key(0))
     return Runner("ours", lambda: roll(state), count * steps, worlds.close)
 
 
 def worlds_and_actions(
-    count: int, objects: Sequence[str], steps: int, engine: Any
+    count: int, source: Path | tuple[str, ...], steps: int, engine: Any
 ) -> tuple[batch.Worlds, Any]:
-    """Ours, and random joint targets."""
-    worlds = batch.make(
-        TASK,
-        worlds=count,
-        seeds=range(min(count, 16)),
-        engine=engine,
-        objects=tuple(objects),
-        reward_mode="dense",
-    )
+    """Ours, of drawn starts or of objects, and random joint targets."""
+    if isinstance(source, Path):
+        worlds = batch.from_pool(source, count, engine)
+    else:
+        seeds = range(min(count, 16))
+        worlds = batch.make(
+            TASK, worlds=count, seeds=seeds, engine=engine, objects=source, reward_mode="dense"
+        )
     layout = worlds.pool.layout
     assert (layout.timestep, layout.substeps) == (PHYSICS_STEP, SUBSTEPS), layout
     held = -(-steps // HELD)
@@ -145,9 +152,9 @@ def worlds_and_actions(
     return worlds, jnp.repeat(targets, HELD, axis=0)[:steps]
 
 
-def mjx_of_ours(count: int, objects: Sequence[str], steps: int) -> Runner:
+def mjx_of_ours(count: int, source: Path | tuple[str, ...], steps: int) -> Runner:
     """The physics of our scene alone, stepped by MJX: its first start's model in every world."""
-    worlds, actions = worlds_and_actions(count, objects, steps, "warp")
+    worlds, actions = worlds_and_actions(count, source, steps, "warp")
 
     def one(state: Any, action: Any) -> tuple[Any, Any]:
         after = worlds.step(state, action)
