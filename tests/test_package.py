@@ -33,7 +33,10 @@ ORDER = (
     ("manipose_mj.grasp_sampling",),
     ("manipose_mj.assets",),
     ("manipose_mj.user_code",),
-    ("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
+    (
+        *("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
+        "manipose_mj.warp_physics",
+    ),
     ("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
 )
 # What scans and generators are made into is the package's; robots and tasks are none of the pipeline's business.
@@ -45,6 +48,7 @@ PIPELINE_KNOWS = (
     "manipose_mj.console",
     "manipose_mj.errors",
     "manipose_mj.lazy_exports",
+    "manipose_mj.warp_physics",
 )
 DOOR = "manipose_mj.assets.catalogue"
 # Folders with one generator per category.

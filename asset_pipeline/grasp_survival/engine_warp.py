@@ -80,7 +80,7 @@ class Batch:
         import warp as wp  # pyright: ignore[reportMissingImports]
 
         from asset_pipeline.grasp_survival import warp_kernels
-        from manipose_mj.batch.kernels.stepping import Stepper
+        from manipose_mj.warp_physics.stepping import Stepper
 
         self._mjw, self._wp, self._kernels = mujoco_warp, wp, warp_kernels
         self._trial, self.worlds, self._room = trial, worlds, room

@@ -16,7 +16,6 @@ from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch.capacity import Capacity, probe
 from manipose_mj.batch.kernels import warp_kernels as kernels
 from manipose_mj.batch.kernels.kernels_ahead import begin_compiling
-from manipose_mj.batch.kernels.stepping import Stepper
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.render_warp import WarpRenderer
 from manipose_mj.batch.row_fields import RowFields
@@ -25,6 +24,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, most_motion
 from manipose_mj.poses import Array
+from manipose_mj.warp_physics.stepping import Stepper
 
 Physics = dict[str, Array]
 _FASTEST = 1e3  # nothing in a scene moves at this speed [m/s, rad/s]; what does has diverged

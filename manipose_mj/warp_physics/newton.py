@@ -138,7 +138,7 @@ def _kernel(nv: int, most_rows: int) -> Any:
         **{s.name: s for s in (limits.ITERATIONS, limits.LS_ITERATIONS)},
     }
     head = "".join(f"constexpr int {name} = {int(value)};\n" for name, value in constants.items())
-    body = files(__package__).joinpath("newton.cuh").read_text(encoding="utf-8")
+    body = files("manipose_mj.warp_physics").joinpath("newton.cuh").read_text(encoding="utf-8")
 
     @wp.func_native(head + body)
     def solve_world(world: int, thread: int, problem: Problem): ...

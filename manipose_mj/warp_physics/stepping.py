@@ -11,9 +11,9 @@ import mujoco_warp as mjw  # pyright: ignore[reportMissingImports]
 import warp as wp  # pyright: ignore[reportMissingImports]
 from mujoco_warp._src import forward, smooth  # pyright: ignore[reportMissingImports]
 
-from manipose_mj.batch.kernels.collisions import Collisions, can_find
-from manipose_mj.batch.kernels.newton import NewtonSolver, can_solve
-from manipose_mj.batch.kernels.trees import subtree_centres, sum_subtrees
+from manipose_mj.warp_physics.collisions import Collisions, can_find
+from manipose_mj.warp_physics.newton import NewtonSolver, can_solve
+from manipose_mj.warp_physics.trees import subtree_centres, sum_subtrees
 
 
 class Stepper:

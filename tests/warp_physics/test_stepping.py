@@ -9,7 +9,7 @@ import pytest
 mjw = pytest.importorskip("mujoco_warp", reason='needs pip install -e ".[gpu]"')
 wp = pytest.importorskip("warp", reason='needs pip install -e ".[gpu]"')
 
-from manipose_mj.batch.kernels.stepping import Stepper  # noqa: E402
+from manipose_mj.warp_physics.stepping import Stepper  # noqa: E402
 
 pytestmark = pytest.mark.full  # it compiles for half a minute
 WORLDS = 8
