@@ -57,7 +57,8 @@ auto sum = [](const float* x) {
 #define EACH_LANE for (int lane = first_lane; lane < end_lane; ++lane)
 
 // This world's part of each array.
-const int width = problem.jacobian.shape[2], most = problem.jaref_scratch.shape[1], address_width = problem.contact_address.shape[1];
+const int width = problem.jacobian.shape[2], most = problem.jaref_scratch.shape[1];
+const int address_width = problem.contact_address.shape[1];
 const float* const J = problem.jacobian.data + size_t(world) * problem.jacobian.shape[1] * width;
 const float* const D = problem.stiffness.data + size_t(world) * problem.stiffness.shape[1];
 const float* const reference = problem.aref.data + size_t(world) * problem.aref.shape[1];
@@ -118,7 +119,8 @@ EACH_LANE {
     search[AT(lane)] = lane < NV && rows > 0 && problem.warm ? problem.warm_start.data[i] : 0.0f;
     smooth[AT(lane)] = 0.0f;
     if (lane < NV) {
-        smooth[AT(lane)] = problem.qfrc_passive.data[i] - problem.qfrc_bias.data[i] + problem.qfrc_actuator.data[i] + problem.qfrc_applied.data[i];
+        const float own = problem.qfrc_passive.data[i] - problem.qfrc_bias.data[i];
+        smooth[AT(lane)] = own + problem.qfrc_actuator.data[i] + problem.qfrc_applied.data[i];
         problem.qfrc_smooth.data[i] = smooth[AT(lane)];
     }
     acceleration[AT(lane)] = inertial[AT(lane)] = pushed[AT(lane)] = 0.0f;
@@ -128,9 +130,9 @@ sync();
 
 // Rows that are in the tile together: at most 32, and whole contacts.
 auto end_of = [&](int begin) {
-    int end = wp::min(begin + 32, rows);
-    if (end < rows && kind[end] == ELLIPTIC) end = wp::min(end, problem.contact_address.data[contact[end] * address_width]);
-    return end;
+    const int end = wp::min(begin + 32, rows);
+    if (end == rows || kind[end] != ELLIPTIC) return end;
+    return wp::min(end, problem.contact_address.data[contact[end] * address_width]);
 };
 int loaded = -1;
 auto load = [&](int begin, int end) {
@@ -229,7 +231,8 @@ auto row_of = [&](int r) {
         row.state = zone_of(cone.mu, normal, tangent);
         spring = row.state == QUADRATIC;
         if (row.state == CONE) {
-            const float beyond = normal - cone.mu * tangent, inverse = 1.0f / tangent, ratio = cone.mu * normal * inverse;
+            const float beyond = normal - cone.mu * tangent, inverse = 1.0f / tangent;
+            const float ratio = cone.mu * normal * inverse;
             // Direction of the row in the scaled space: the normal's factor, or friction times the unit tangent.
             auto lean = [&](int j) {
                 const float f = cone.friction[j - 1];
@@ -266,7 +269,7 @@ auto row_of = [&](int r) {
     return row;
 };
 
-// Forces of all rows, what they push, the gradient of the objective, and the Hessian's columns, a lane each. Returns the
+// Forces of all rows, what they push, the gradient of the objective, and the Hessian's columns, a lane each. Gives the
 // gradient's length, and whether the cost was another than a quadratic one since the last time.
 float column[NV][HELD];
 auto differentiate = [&](bool& bent) {
@@ -408,7 +411,8 @@ auto along = [&](int r, float alpha, float& slope, float& curvature) {
             slope = springs;
             curvature = stiff;
         } else if (zone == CONE) {
-            const float growth = uv / tangent, beyond = normal - cone.mu * tangent, rate = faster - cone.mu * growth;
+            const float growth = uv / tangent, beyond = normal - cone.mu * tangent;
+            const float rate = faster - cone.mu * growth;
             slope = cone.dm * beyond * rate;
             curvature = cone.dm * (rate * rate - cone.mu * beyond * (vv - growth * growth) / tangent);
         }
@@ -493,8 +497,9 @@ for (float alpha = 1.0f;;) {
     // A whole step over a quadratic cost has found the least of it.
     const bool found_least = iterations > 0 && alpha == 1.0f && !bent;
     if (scale * steepness >= tolerance && alpha > NOISE && !found_least) drop = find_search();
-    if (!(steepness + drop >= 0.0f)) {  // not a number: neither is the result
-        EACH_LANE acceleration[AT(lane)] = steepness + drop;
+    const float both = steepness + drop;
+    if (both != both) {  // not a number: neither is the result
+        EACH_LANE acceleration[AT(lane)] = both;
         break;
     }
     if (0.5f * scale * drop < tolerance) break;
