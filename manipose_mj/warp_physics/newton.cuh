@@ -31,7 +31,8 @@ auto count_of = [](const int* x, int lane) { return __shfl_sync(0xffffffffu, x[0
 auto any = [](const int* x) { return __any_sync(0xffffffffu, x[0]) != 0; };
 auto sum = [](const float* x) {
     float total = x[0];
-    for (int step = 16; step > 0; step >>= 1) total += __shfl_xor_sync(0xffffffffu, total, step);
+    // Rounded by themselves: fused with a product, the sums of two lanes would differ, and so would their ways.
+    for (int step = 16; step > 0; step >>= 1) total = __fadd_rn(total, __shfl_xor_sync(0xffffffffu, total, step));
     return total;
 };
 #else
@@ -499,7 +500,7 @@ for (float alpha = 1.0f;;) {
     if (scale * steepness >= tolerance && alpha > NOISE && !found_least) drop = find_search();
     const float both = steepness + drop;
     if (both != both) {  // not a number: neither is the result
-        EACH_LANE acceleration[AT(lane)] = both;
+        EACH_LANE acceleration[AT(lane)] = inertial[AT(lane)] = both;
         break;
     }
     if (0.5f * scale * drop < tolerance) break;

@@ -26,10 +26,11 @@ class Stepper:
     """
 
     def __init__(self, model: Any, data: Any) -> None:
-        """Takes the arrays of both, which must not be replaced afterwards, options aside.
+        """Takes the arrays of both, whose values may change but which must not be replaced afterwards.
 
         Args:
-          model: `mujoco_warp.Model`.
+          model: `mujoco_warp.Model`. Of its options those may change that are arrays, numbers of iterations, and whether
+            to begin at the warm start.
           data: `mujoco_warp.Data`.
         """
         self._model, self._data = model, data

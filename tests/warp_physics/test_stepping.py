@@ -32,7 +32,11 @@ SCENE = """
       </body>
     </body>
   </worldbody>
-  <tendon><fixed name="both"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="-.5"/></fixed></tendon>
+  <tendon>
+    <fixed name="both" armature="{armature}" frictionloss=".02" limited="true" range="-.4 .4">
+      <joint joint="shoulder" coef="1"/><joint joint="elbow" coef="-.5"/>
+    </fixed>
+  </tendon>
   <equality><joint joint1="shoulder" joint2="elbow" polycoef="0 .1 0 0 0" active="{equality}"/></equality>
   <actuator><position tendon="both" kp="3" kv=".2"/></actuator>
 </mujoco>
@@ -40,9 +44,22 @@ SCENE = """
 BOX = '<body pos="{x} {y} {z}"><freejoint/><geom type="box" size=".05 .04 .03" condim="{rows}"/></body>'
 
 
-def scene(cone="elliptic", impratio=100.0, integrator="implicitfast", equality="false"):
-    text = SCENE.format(cone=cone, impratio=impratio, integrator=integrator, equality=equality)
-    return mujoco.MjModel.from_xml_string(text)
+def scene(**options):
+    usual = {"cone": "elliptic", "impratio": 100.0, "integrator": "implicitfast"}
+    usual |= {"equality": "false", "armature": 0.0}
+    return mujoco.MjModel.from_xml_string(SCENE.format(**usual | options))
+
+
+def spheres(margin=0.0):
+    """Two 2 cm apart, one of which a pair with margins of its own joins to a third."""
+    ball = (
+        '<body pos="{x} 0 1"><freejoint/><geom name="{name}" size=".05" margin="{margin}"/></body>'
+    )
+    balls = "".join(ball.format(x=0.12 * i, name=f"ball_{i}", margin=margin) for i in range(3))
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom type="plane" size="2 2 .1"/>{balls}</worldbody>'
+        '<contact><pair geom1="ball_1" geom2="ball_2" margin=".03"/></contact></mujoco>'
+    )
 
 
 def heap():
@@ -60,12 +77,14 @@ def heap():
 class Pair:
     """The same worlds twice: stepped by MuJoCo Warp, and by `Stepper`."""
 
-    def __init__(self, host, worlds=WORLDS, speed=1.0):
+    def __init__(self, host, worlds=WORLDS, speed=1.0, njmax=300, prepare=None):
         with wp.ScopedDevice("cpu"):
             self.model = mjw.put_model(host)
             self.model.opt.warn_overflow = 0
+            if prepare is not None:
+                prepare(self.model)
             self.theirs, self.ours = (
-                mjw.make_data(host, nworld=worlds, naconmax=80 * worlds, njmax=300)
+                mjw.make_data(host, nworld=worlds, naconmax=80 * worlds, njmax=njmax)
                 for _ in range(2)
             )
             rng = np.random.default_rng(0)
@@ -79,14 +98,15 @@ class Pair:
     def step(self):
         """One step of both from the same states."""
         with wp.ScopedDevice("cpu"):
-            for name in ("qpos", "qvel", "qacc_warmstart"):
+            for name in ("qpos", "qvel", "qacc_warmstart", "qfrc_applied"):
                 wp.copy(getattr(self.ours, name), getattr(self.theirs, name))
             mjw.step(self.model, self.theirs)
             self.stepper.step()
 
     def apart(self, name):
         """The largest difference, relative to what the largest is in that world."""
-        expected, found = (getattr(data, name).numpy() for data in (self.theirs, self.ours))
+        two = self.theirs, self.ours
+        expected, found = (getattr(d, name).numpy().reshape(d.nworld, -1) for d in two)
         largest = np.maximum(np.abs(expected).max(axis=1), 1.0)
         return (np.abs(expected - found).max(axis=1) / largest).max()
 
@@ -139,9 +159,10 @@ def objective(model, data, world, acceleration):
         scene(),
         scene(impratio=1.0, integrator="Euler", equality="true"),
         scene(cone="pyramidal", impratio=1.0),
+        scene(armature=0.05),
         heap(),
     ],
-    ids=["elliptic", "equality", "pyramids", "heap"],
+    ids=["elliptic", "equality", "pyramids", "armature", "heap"],
 )
 def test_worlds_are_stepped_as_by_mujoco_warp(host):
     pair = Pair(host)
@@ -153,6 +174,8 @@ def test_worlds_are_stepped_as_by_mujoco_warp(host):
         rows = max(rows, pair.ours.nefc.numpy().max())
         iterations = max(iterations, pair.ours.solver_niter.numpy().max())
         assert pair.apart("qvel") < 1e-3
+        assert pair.apart("qfrc_constraint") < 1e-2
+        assert pair.apart("qfrc_bias") < 1e-4
         assert (pair.ours.nacon.numpy() == pair.theirs.nacon.numpy()).all()
         for world in range(WORLDS if step % 5 == 0 else 0):
             expected, found = (
@@ -200,6 +223,118 @@ def test_a_world_without_constraints_falls():
     assert pair.stepper.fused and not pair.ours.nefc.numpy().any()
     assert pair.ours.qacc.numpy()[:, 2] == pytest.approx(-9.81, abs=1e-4)
     assert pair.apart("qacc") < 1e-5
+
+
+def test_margins_are_those_of_now():
+    pair = Pair(spheres(), worlds=2, speed=0.0)
+    pair.step()
+    assert (
+        pair.ours.nacon.numpy() == pair.theirs.nacon.numpy() == [2]
+    )  # the named pair of two worlds
+    pair.model.geom_margin.assign(np.full(pair.model.geom_margin.shape, 0.03, np.float32))
+    pair.step()
+    assert pair.ours.nacon.numpy() == pair.theirs.nacon.numpy() == [4]
+    pair = Pair(spheres(margin=0.015), worlds=2, speed=0.0)
+    pair.step()
+    assert pair.ours.nacon.numpy() == pair.theirs.nacon.numpy() == [4]
+
+
+def test_worlds_have_masses_sizes_and_tolerances_of_their_own():
+    factors = np.linspace(0.5, 2.0, WORLDS, dtype=np.float32)
+
+    def prepare(model):
+        for name in ("body_mass", "body_subtreemass", "body_inertia", "geom_size", "geom_rbound"):
+            values = getattr(model, name).numpy()
+            scaled = values * factors.reshape(-1, *[1] * (values.ndim - 1))
+            setattr(model, name, wp.array(scaled, dtype=getattr(model, name).dtype))
+        model.opt.tolerance = wp.array(np.geomspace(1e-6, 1e6, WORLDS), dtype=float)
+
+    pair = Pair(scene(), prepare=prepare)
+    for _ in range(60):
+        pair.step()
+        assert (pair.ours.nacon.numpy() == pair.theirs.nacon.numpy()).all()
+        assert pair.apart("subtree_com") < 1e-5 and pair.apart("qfrc_bias") < 1e-4
+    precise = pair.ours.qacc.numpy()[:2], pair.theirs.qacc.numpy()[:2]
+    np.testing.assert_allclose(*precise, rtol=0, atol=0.5)
+    # The last world's tolerance is met before a step.
+    assert pair.ours.solver_niter.numpy()[-1] == 0 < pair.ours.solver_niter.numpy()[0]
+
+
+def test_the_warm_start_can_be_left_out():
+    warm, cold = Pair(scene()), Pair(scene())
+    cold.model.opt.disableflags |= int(mjw.DisableBit.WARMSTART)
+    taken = [0, 0]
+    for _ in range(60):
+        for i, pair in enumerate((warm, cold)):
+            pair.step()
+            taken[i] += pair.ours.solver_niter.numpy().sum()
+    assert cold.apart("qvel") < 1e-3
+    assert taken[1] > 1.2 * taken[0]
+
+
+@pytest.mark.parametrize("njmax", [14, 20, 33])
+def test_rows_without_room_are_told_and_harm_nothing(njmax):
+    pair = Pair(scene(), njmax=njmax)
+    flagged = np.zeros(WORLDS, int)
+    for _ in range(60):
+        pair.step()
+        assert (pair.ours.nefc.numpy() == pair.theirs.nefc.numpy()).all()
+        flagged |= pair.ours.overflow.numpy() & int(mjw.OverflowType.NEFC)
+        lacking = pair.ours.nefc.numpy() > njmax
+        assert ((pair.ours.overflow.numpy() & int(mjw.OverflowType.NEFC)) > 0)[lacking].all()
+        assert np.isfinite(pair.ours.qacc.numpy()).all()
+        # MuJoCo Warp's may be no numbers.
+        for name in ("qpos", "qvel", "qacc_warmstart"):
+            getattr(pair.theirs, name).assign(getattr(pair.ours, name).numpy())
+    assert flagged.any() or njmax == 33
+
+
+def sensing(model):
+    model.nsensordata = 1
+
+
+def optioned(**values):
+    def change(model):
+        for name, value in values.items():
+            setattr(model.opt, name, value)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "prepare",
+    [
+        sensing,
+        lambda model: setattr(model.callback, "control", lambda *_: None),
+        optioned(solver=mjw.SolverType.CG),
+        optioned(integrator=mjw.IntegratorType.RK4),
+        optioned(noslip_iterations=3),
+        optioned(enableflags=int(mjw.EnableBit.ENERGY)),
+        optioned(disableflags=int(mjw.DisableBit.CONTACT)),
+        optioned(broadphase=mjw.BroadphaseType.SAP_TILE),
+    ],
+    ids=["sensor", "callback", "cg", "rk4", "noslip", "energy", "no contacts", "sap"],
+)
+def test_what_steps_leave_out_is_left_to_mujoco_warp(prepare):
+    model = mjw.put_model(scene())
+    data = mjw.make_data(scene(), nworld=1, naconmax=40, njmax=100)
+    assert Stepper(model, data).fused
+    prepare(model)
+    assert not Stepper(model, data).fused
+
+
+def test_a_force_that_is_no_number_makes_the_state_none():
+    for flags in (0, int(mjw.DisableBit.WARMSTART)):
+        pair = Pair(scene())
+        pair.model.opt.disableflags |= flags
+        for _ in range(40):
+            pair.step()
+        force = np.zeros(pair.theirs.qfrc_applied.shape, np.float32)
+        force[3, 0] = np.nan
+        pair.theirs.qfrc_applied.assign(force)
+        pair.step()
+        broken = np.isnan(pair.ours.qvel.numpy()).any(axis=1)
+        assert broken.tolist() == [world == 3 for world in range(WORLDS)]
 
 
 def test_a_world_that_is_no_number_spares_the_others_and_ends():
