@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from batch.arm_targets import random_targets
 from batch.solver_options import add_set, set_options
 from mujoco import rollout
 
@@ -33,8 +34,6 @@ from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 TURNS = 5
-HELD = 25  # control steps for which a random target is held
-SPREAD = 0.6  # of random targets about the start [rad]
 COLUMNS = (
     "task", "worlds", "environment steps/s", "physics steps/s", "bare physics steps/s", "share", "contacts",
     "iterations", "overflowed", "diverged", "memory [GB]", "start [s]", "first step [s]",
@@ -101,7 +100,7 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
     )
     made = time.perf_counter() - started
     state = worlds.reset(jax.random.key(0))
-    actions = _actions(state, arguments.steps)
+    actions = random_targets(state, arguments.steps)
     started = time.perf_counter()
     jax.block_until_ready(worlds.step(state, actions[0]))
     first = time.perf_counter() - started
@@ -145,16 +144,6 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
     )
     print("| " + " | ".join(map(str, values)) + " |", flush=True)
     worlds.close()
-
-
-def _actions(state: batch.State, steps: int) -> jax.Array:
-    """Joint targets about where the arms start, and openings, each held for a while."""
-    joints = state.measurement.joints
-    held = -(-steps // HELD)
-    keys = jax.random.split(jax.random.key(1), 2)
-    arm = joints + SPREAD * jax.random.uniform(keys[0], (held, *joints.shape), minval=-1.0)
-    opening = jax.random.uniform(keys[1], (held, len(joints), 1), maxval=0.08)
-    return jnp.repeat(jnp.concatenate([arm, opening], axis=-1), HELD, axis=0)[:steps]
 
 
 def _bare_c(

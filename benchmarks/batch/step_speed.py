@@ -17,16 +17,16 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import mujoco_warp as mjw
 import numpy as np
 import warp as wp
+from arm_targets import random_targets
 
 from manipose_mj import batch
 from manipose_mj.batch.starts import StartPool
 
 TURNS, REPEATS = 5, 20
-STEPS, HELD, SPREAD = 50, 25, 0.6
+STEPS = 50
 
 
 def main() -> None:
@@ -63,12 +63,7 @@ def row(pool: StartPool, count: int, steps: int) -> str:
     """Of so many worlds."""
     worlds = batch.from_pool(pool, count, "warp")
     state = worlds.reset(jax.random.key(0))
-    joints = state.measurement.joints
-    keys = jax.random.split(jax.random.key(1), 2)
-    turns = -(-steps // HELD)
-    arm = joints + SPREAD * jax.random.uniform(keys[0], (turns, *joints.shape), minval=-1.0)
-    opening = jax.random.uniform(keys[1], (turns, len(joints), 1), maxval=0.08)
-    actions = jnp.repeat(jnp.concatenate([arm, opening], axis=-1), HELD, axis=0)[:steps]
+    actions = random_targets(state, steps)
     jax.block_until_ready(jax.jit(lambda s: worlds.rollout(actions, s))(state))
     engine: Any = worlds.engine
     model, data, stepper = engine._model, engine._data, engine._stepper

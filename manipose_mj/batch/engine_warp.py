@@ -28,7 +28,7 @@ from manipose_mj.warp_physics.stepping import Stepper
 
 Physics = dict[str, Array]
 _FASTEST = 1e3  # nothing in a scene moves at this speed [m/s, rad/s]; what does has diverged
-# Captured steps hold several times what the data do (measured: 3.2 and 3.9 times).
+# Captured steps of MuJoCo Warp hold several times what the data do (measured: 3.2 and 3.9 times).
 _SCRATCH = 4
 _DRY_CONTACTS, _DRY_CONSTRAINTS = 64, 400  # room that nothing is computed in
 _MOVING = ("qpos", "qvel", "ctrl", "qacc_warmstart")  # the state of a world

@@ -1,6 +1,6 @@
 """The constraint solver of batched worlds: one kernel, in which a warp of the GPU solves a world from beginning to end.
 
-MuJoCo Warp solves with some fifteen kernels an iteration, for all worlds as often as one of them needs it. Objective,
+MuJoCo Warp solves with ten kernels an iteration, for all worlds as often as one of them needs it. Objective,
 tolerances and result are the same here; the code is in `newton.cuh`. See `docs/experiments/batched_worlds.md`.
 """
 

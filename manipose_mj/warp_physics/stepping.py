@@ -1,8 +1,9 @@
 """The physics step of batched worlds: MuJoCo Warp's, with fewer kernels where one does the work of many.
 
-Of a step's 120 kernels and clearings half go along the kinematic tree, one level of bodies each, or find accelerations
-without contacts, which `newton` does not need; for a few thousand worlds each takes some microseconds, whatever it
-does. Pairs of shapes that are far apart are found by `collisions`.
+A step of a box's scene is 142 kernels and clearings in MuJoCo Warp, and 68 here; for a few thousand worlds each takes
+some microseconds, whatever it does. Gone are those of the solver's iterations (`newton`), those of each level of the
+kinematic tree (`trees`), and those that find accelerations without contacts, which `newton` does not need. What is near
+each other is found by `collisions`.
 """
 
 from typing import Any

@@ -272,7 +272,7 @@ def test_the_warm_start_can_be_left_out():
     assert taken[1] > 1.2 * taken[0]
 
 
-@pytest.mark.parametrize("njmax", [14, 20, 33])
+@pytest.mark.parametrize("njmax", [14, 20])
 def test_rows_without_room_are_told_and_harm_nothing(njmax):
     pair = Pair(scene(), njmax=njmax)
     flagged, cut = np.zeros(WORLDS, int), 0
@@ -287,7 +287,7 @@ def test_rows_without_room_are_told_and_harm_nothing(njmax):
         # MuJoCo Warp's may be no numbers.
         for name in ("qpos", "qvel", "qacc_warmstart"):
             getattr(pair.theirs, name).assign(getattr(pair.ours, name).numpy())
-    assert (flagged.any() and cut) or njmax == 33
+    assert flagged.any() and cut
 
 
 def cut_rows_push_nothing(data, njmax):
