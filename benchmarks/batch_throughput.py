@@ -4,7 +4,7 @@ python benchmarks/throughput.py --engine warp|c [--only TASK] [--worlds N ...] [
 
 Both loops run in one process, in turns; medians of the turns. The bare loop of MuJoCo Warp is one captured graph a
 control step: `step1`, then `step2` and `step1` for every physics step, with the set-points that our loop sent; that of
-engine `c` is one call of `mujoco.rollout` with as many threads as our loop has processes. Figures count only without
+engine `c` is one call of `mujoco.rollout` with as many threads as our loop. Figures count only without
 overflow and divergence, which are printed.
 """
 
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--starts", type=int, default=8, help="drawn before the measurement")
     parser.add_argument("--pool", type=Path, help="drawn starts, read from here or written here")
     parser.add_argument("--steps", type=int, default=50, help="control steps in a turn")
-    parser.add_argument("--processes", type=int, default=1, help="of engine c")
+    parser.add_argument("--threads", type=int, default=1, help="of engine c")
     parser.add_argument("--noslip", type=int, help="iterations, instead of the model's own")
     parser.add_argument("--impratio", type=float, help="instead of the model's own")
     add_set(parser, "instead of the model's own")
@@ -96,7 +96,7 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
     started = time.perf_counter()
     room = None if arguments.room is None else Capacity(*arguments.room)
     worlds = batch.from_pool(
-        pool, count, arguments.engine, processes=arguments.processes, capacity=room
+        pool, count, arguments.engine, threads=arguments.threads, capacity=room
     )
     made = time.perf_counter() - started
     state = worlds.reset(jax.random.key(0))
@@ -113,7 +113,7 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
         spread = jnp.arange(count) % round(1 / arguments.resets)
         state = state._replace(count=horizon - 1 - spread.astype(jnp.int32))
     if arguments.engine == "c":
-        bare = _bare_c(worlds, state, actions, arguments.processes)
+        bare = _bare_c(worlds, state, actions, arguments.threads)
     else:
         bare = _bare_warp(worlds, state, actions)
     ours, others, ended = [], [], []

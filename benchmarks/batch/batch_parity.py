@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=170)
     parser.add_argument("--starts", type=int, default=16)
     parser.add_argument("--pool", type=Path)
-    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--noslip", type=int)
     parser.add_argument("--impratio", type=float)
     arguments = parser.parse_args()
@@ -53,12 +53,12 @@ def main() -> None:
             model.opt.impratio = arguments.impratio
     pool = replace(pool, layout=replace(pool.layout, control_mode="pd_ee_pose"))
     print(f"{machine()}; {jax.devices()[0].device_kind}; MuJoCo {mujoco.__version__}")
-    compare(pool, arguments.worlds, arguments.processes)
+    compare(pool, arguments.worlds, arguments.threads)
 
 
-def compare(pool: StartPool, count: int, processes: int) -> None:
+def compare(pool: StartPool, count: int, threads: int) -> None:
     """Make the steps and print the differences."""
-    reference = batch.from_pool(pool, count, "c", processes=processes)
+    reference = batch.from_pool(pool, count, "c", threads=threads)
     other = batch.from_pool(pool, count, "warp")
     state = reference.reset(jax.random.key(0))
     yaw = jax.random.uniform(jax.random.key(1), (count,), minval=-1.5, maxval=1.5)

@@ -45,7 +45,7 @@ def main() -> None:
         )
         # As many worlds as plans: each in its own.
         played = [
-            replays(plans, Variation(), len(plans.plans), engine=engine, processes=arguments.jobs)
+            replays(plans, Variation(), len(plans.plans), engine=engine, threads=arguments.jobs)
             for engine in arguments.engines
         ]
         own = [(task, a, b) for a, b in zip(*played, strict=True)]

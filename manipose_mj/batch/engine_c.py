@@ -1,11 +1,9 @@
-"""The engine `c`: MuJoCo on the CPU, in this process or in several; bit for bit the CPU task's physics."""
+"""The engine `c`: MuJoCo on the CPU, in one thread or in several; bit for bit the CPU task's physics."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -21,41 +19,25 @@ from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from manipose_mj.poses import Array
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
-_simulator: Simulator | None = None  # of a worker's process
-
 Words = UInt32[np.ndarray, "worlds words"]
 Advanced = tuple[Words, Bool[np.ndarray, " worlds"], FlatMeasurement]
 
 
 class CEngine:
-    """Worlds are split evenly over processes, each of which keeps the data of its own."""
+    """Worlds are split evenly over threads, each of which steps its own."""
 
     name = "c"
 
-    def __init__(self, pool: StartPool, worlds: int, *, processes: int = 1) -> None:
-        """Starts the processes.
+    def __init__(self, pool: StartPool, worlds: int, *, threads: int = 1) -> None:
+        """Prepares the worlds.
 
         Args:
           pool: Of starts.
           worlds: How many there are.
-          processes: That step them; one: this one.
-
-        Raises:
-          InputError: They do not start.
+          threads: That step them.
         """
         self._pool, self._worlds = pool, worlds
-        processes = min(processes, worlds)
-        bounds = np.linspace(0, worlds, processes + 1).astype(int)
-        self._chunks = [range(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-        self._local = Simulator(pool, worlds) if processes == 1 else None
-        self._workers: list[ProcessPoolExecutor] = []
-        if self._local is None:
-            # One executor a process: a world stays with the process that has its data.
-            self._workers = [
-                ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
-                for _ in self._chunks
-            ]
-            _begin_all(self._workers, pool, self._chunks)
+        self._simulator = Simulator(pool, worlds, threads=threads)
         self._one = pool.starts[0].measurement
         shapes = jax.ShapeDtypeStruct
         self._shapes = (
@@ -77,8 +59,12 @@ class CEngine:
         rows: Int[Array, " worlds"],
         targets: Float[Array, "worlds substeps 8"],
     ) -> tuple[UInt32[Array, "worlds words"], Bool[Array, " worlds"], Measurement]:
+        # One array, since each costs JAX as much as the step of a world takes.
+        parts = (physics, rows.astype(jnp.int32), targets)
+        words = [jax.lax.bitcast_convert_type(part, jnp.uint32) for part in parts]
+        given = jnp.concatenate([part.reshape(len(rows), -1) for part in words], axis=1)
         after, diverged, measured = jax.pure_callback(
-            self._advance, self._shapes, physics, rows, targets
+            partial(self._advance, targets.dtype), self._shapes, given
         )
         return after, diverged, measured.split(self._one)
 
@@ -121,57 +107,14 @@ class CEngine:
         return np.arange(len(self._pool.starts[row].instances))
 
     def close(self) -> None:
-        for worker in self._workers:
-            worker.shutdown(cancel_futures=True)
-        self._workers = []
+        self._simulator.close()
 
-    def _advance(self, physics: Array, rows: Array, targets: Array) -> Advanced:
-        words, rows = np.asarray(physics), np.asarray(rows)
-        targets = np.asarray(targets, float)
-        if self._local is not None:
-            return _single(self._local.advance(words, rows, targets))
-        waiting: list[Future[Advanced]] = [
-            worker.submit(_step, *(a[chunk.start : chunk.stop] for a in (words, rows, targets)))
-            for worker, chunk in zip(self._workers, self._chunks, strict=True)
-        ]
-        parts = [future.result() for future in waiting]
-        return jax.tree.map(lambda *each: np.concatenate(each), *parts)
-
-
-def _begin_all(workers: list[ProcessPoolExecutor], pool: StartPool, chunks: list[range]) -> None:
-    """Gives every process its worlds.
-
-    Raises:
-      InputError: One does not start.
-    """
-    # Not as the executors' initialisers: the whole pool would be written to a process that may be gone by then.
-    begun = [
-        worker.submit(_begin, pool, len(chunk))
-        for worker, chunk in zip(workers, chunks, strict=True)
-    ]
-    try:
-        for each in begun:
-            each.result()
-    except BrokenProcessPool:
-        for worker in workers:
-            worker.shutdown(wait=False, cancel_futures=True)
-        raise InputError(
-            "processes: they do not start; each runs your script anew, whose own work has to stand under "
-            'if __name__ == "__main__":'
-        ) from None
-
-
-def _single(advanced: Advanced) -> Advanced:
-    """Measurements in the precision that JAX has."""
-    words, diverged, measured = advanced
-    return words, diverged, measured._replace(values=measured.values.astype(np.float32))
-
-
-def _begin(pool: StartPool, worlds: int) -> None:
-    global _simulator
-    _simulator = Simulator(pool, worlds)
-
-
-def _step(words: Words, rows: np.ndarray, targets: np.ndarray) -> Advanced:
-    assert _simulator is not None
-    return _single(_simulator.advance(words, rows, targets))
+    def _advance(self, real: np.dtype, given: Array) -> Advanced:
+        words = np.asarray(given)
+        size = self._shapes[0].shape[1]
+        rows, targets = words[:, size].view(np.int32), words[:, size + 1 :].view(real)
+        after, diverged, measured = self._simulator.advance(
+            words[:, :size], rows, targets.reshape(len(words), -1, 8).astype(float)
+        )
+        # In the precision that JAX has.
+        return after, diverged, measured._replace(values=measured.values.astype(np.float32))

@@ -12,7 +12,6 @@ import jax
 
 from manipose_mj.batch.capacity import Capacity
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.engine_c import CEngine
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, check_count, how_to_install, unknown_name
@@ -33,7 +32,7 @@ def make(
     seed: int = 0,
     seeds: Sequence[int] | None = None,
     engine: EngineName = "auto",
-    processes: int = 1,
+    threads: int = 1,
     visual: bool = False,
     capacity: Capacity | None = None,
     **config: Unpack[EnvOptions],
@@ -48,7 +47,7 @@ def make(
       seeds: These instead. Each is drawn once, by the CPU task's own reset, which takes 0.1 to 1 s.
       engine: `"c"`, MuJoCo on the CPU, bit for bit the task's physics; `"warp"`, MuJoCo Warp on an NVIDIA GPU;
         `"auto"`, the latter where it is.
-      processes: Of the engine `c`.
+      threads: Of the engine `c`, that step its worlds.
       visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
       capacity: Room of the engine `warp` for contacts and constraints; without it, from a probe of the starts.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose`, or keys of these), `control_mode`, `reward_mode`,
@@ -65,7 +64,7 @@ def make(
         raise InputError(f"seeds is {seeds!r}; expected whole numbers, each once")
     chosen = available_engine(engine)
     pool = draw_pool(env_config(task, config), list(seeds))
-    return from_pool(pool, worlds, chosen, processes=processes, visual=visual, capacity=capacity)
+    return from_pool(pool, worlds, chosen, threads=threads, visual=visual, capacity=capacity)
 
 
 def from_pool(
@@ -73,7 +72,7 @@ def from_pool(
     worlds: int,
     engine: EngineName = "auto",
     *,
-    processes: int = 1,
+    threads: int = 1,
     visual: bool = False,
     capacity: Capacity | None = None,
 ) -> Worlds:
@@ -83,7 +82,7 @@ def from_pool(
       InputError: The file holds no pool, or the engine cannot run here.
     """
     require_worlds(worlds)
-    check_count("processes", processes, least=1)
+    check_count("threads", threads, least=1)
     if not isinstance(capacity, Capacity | None):
         raise InputError(f"capacity is {capacity!r}; expected a batch.Capacity, or None")
     chosen = available_engine(engine)
@@ -93,7 +92,9 @@ def from_pool(
         from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
 
         return Worlds(pool, WarpEngine(pool, worlds, capacity, visual=visual), worlds)
-    return Worlds(pool, CEngine(pool, worlds, processes=processes), worlds)
+    from manipose_mj.batch.engine_c import CEngine  # Numba takes half a second
+
+    return Worlds(pool, CEngine(pool, worlds, threads=threads), worlds)
 
 
 def require_worlds(worlds: int) -> None:

@@ -1,4 +1,4 @@
-"""MuJoCo on the CPU, many worlds one after the other: what each process of the engine `c` runs.
+"""MuJoCo on the CPU, many worlds one after the other: what the engine `c` runs.
 
 A world's simulation stays in its own data from step to step. Its whole state is also returned, and where the
 caller goes on from another one, it is put back first: stepping is a function of the state, bit for bit.
@@ -6,48 +6,44 @@ caller goes on from another one, it is put back first: stepping is a function of
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from operator import attrgetter
+
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
+from manipose_mj.batch.kernels.cpu_loops import measure, read, step
 from manipose_mj.batch.measurement import FlatMeasurement, flat_values
-from manipose_mj.batch.measurer import Measurer, read_views
 from manipose_mj.batch.starts import RowModels, StartPool
-from manipose_mj.mjcf.panda.servos import ServoAddresses, ServoGroup, Servos
-from manipose_mj.tasks.core.simulation_state import FlatReader, unflatten, write_simulation
+from manipose_mj.batch.world_tables import empty_tables, enter, enter_contacts
+from manipose_mj.mjcf.panda.servos import Servos
+from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS, unflatten, write_simulation
 
-_GROUP = 64  # worlds that step side by side
-# What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
-_DIVERGED = [
-    int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
-    for name in ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
-]
-
-
-class _World:
-    """The data of one world, and views of it."""
-
-    def __init__(self, model: mujoco.MjModel, addresses: ServoAddresses) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
-        self.servos = Servos.of(model, self.data, addresses)
-        self.state = FlatReader(model, self.data)
-        self.warnings = self.data.warning.number
-        self.read = read_views(self.data)
+_COUNTS = attrgetter("ncon", *AWAKE_COUNTS)
 
 
 class Simulator:
     """Steps worlds of a pool of starts."""
 
-    def __init__(self, pool: StartPool, worlds: int) -> None:
-        """Prepares so many worlds, of which each keeps its data."""
+    def __init__(self, pool: StartPool, worlds: int, *, threads: int = 1) -> None:
+        """Prepares so many worlds, of which each keeps its data.
+
+        Args:
+          pool: Of starts.
+          worlds: How many.
+          threads: That step them.
+        """
         self._pool = pool
-        self._models, self._measurer = RowModels(pool), Measurer(pool)
-        self._worlds: list[_World | None] = [None] * worlds
+        self._models, self._tables = RowModels(pool), empty_tables(pool, worlds)
+        self._servos: list[Servos | None] = [None] * worlds
+        self._datas: list[mujoco.MjData | None] = [None] * worlds
         self._rows = np.full(worlds, -1)
         self._words = np.zeros((worlds, state_words(pool)), np.uint32)  # as last returned
-        firsts = range(0, worlds, _GROUP)
-        self._groups = [slice(first, min(first + _GROUP, worlds)) for first in firsts]
-        self._servos: list[ServoGroup | None] = [None] * len(self._groups)
+        one = pool.starts[0].measurement
+        self._values, self._touched = len(flat_values(one)), one.contacts.shape
+        self._bounds = np.linspace(0, worlds, min(threads, worlds) + 1).astype(int).tolist()
+        self._threads = ThreadPoolExecutor(len(self._bounds) - 1) if threads > 1 else None
 
     def advance(
         self,
@@ -68,18 +64,59 @@ class Simulator:
         for i in np.flatnonzero(self._rows != rows).tolist():
             self._begin(i, int(rows[i]))
         for i in np.flatnonzero((self._words != words).any(axis=1)).tolist():
-            world = self._at(i)
-            state = unflatten(world.model, world.data, words[i].view(float))
-            write_simulation(world.model, world.data, state)
-        worlds = [self._at(i) for i in range(len(self._worlds))]
-        for number, group in enumerate(self._groups):
-            self._step(number, worlds[group], targets[group])
-        states = np.zeros_like(words)
-        for world, flat in zip(worlds, states.view(float), strict=True):
-            world.state.read_into(flat)
-        measured = self._measurer.measure([w.data for w in worlds], [w.read for w in worlds], rows)
-        warnings = np.array([world.warnings for world in worlds])
-        diverged = np.asarray(warnings[:, _DIVERGED].any(axis=1))
+            model, data = self.held(i)
+            write_simulation(model, data, unflatten(model, data, words[i].copy().view(float)))
+        robots = self._tables.robots
+        if self._threads is None:
+            step(robots, targets, 0, len(rows))
+        else:
+            firsts, ends = self._bounds[:-1], self._bounds[1:]
+            list(self._threads.map(lambda a, b: step(robots, targets, a, b), firsts, ends))
+        return self._seen(rows)
+
+    def held(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The model and data of a world that has made a step and did not diverge in it."""
+        servos = self._at(world)
+        return servos.model, servos.data
+
+    def close(self) -> None:
+        """Ends the threads."""
+        if self._threads is not None:
+            self._threads.shutdown()
+
+    def _begin(self, number: int, row: int) -> None:
+        """Give a world new data, of another start."""
+        model = self._models.at(row)
+        start = self._pool.starts[row]
+        servos = Servos.of(model, mujoco.MjData(model), start.addresses.servos)
+        self._servos[number] = servos
+        self._datas[number] = servos.data
+        enter(self._tables, number, start, servos)
+        self._rows[number] = row
+        self._words[number] = 0
+
+    def _at(self, number: int) -> Servos:
+        servos = self._servos[number]
+        assert servos is not None, f"world {number} has not been begun"
+        return servos
+
+    def _seen(
+        self, rows: Int[np.ndarray, " worlds"]
+    ) -> tuple[UInt32[np.ndarray, "worlds words"], Bool[np.ndarray, " worlds"], FlatMeasurement]:
+        """States after a step, who diverged, and measurements."""
+        tables, datas = self._tables, self._datas
+        states = np.zeros_like(self._words)
+        counts = np.array(list(map(_COUNTS, datas)))
+        contacts = counts[:, 0]
+        read(tables, counts[:, 1:], states.view(float))
+        for i in np.flatnonzero((contacts > 0) & (tables.contacts == 0)).tolist():
+            enter_contacts(tables, i, datas[i])
+        measured = FlatMeasurement(
+            np.empty((len(rows), self._values)),
+            np.zeros((len(rows), *self._touched), bool),
+        )
+        diverged = np.empty(len(rows), bool)
+        measure(tables, contacts, *measured, diverged)
         for i in np.flatnonzero(diverged).tolist():
             self._rows[i] = -1
             states[i] = 0
@@ -87,39 +124,6 @@ class Simulator:
             measured.values[i], measured.contacts[i] = flat_values(start), start.contacts
         self._words[:] = states
         return states, diverged, measured
-
-    def held(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """The model and data of a world that has made a step and did not diverge in it."""
-        return self._at(world).model, self._at(world).data
-
-    def _begin(self, number: int, row: int) -> None:
-        """Give a world new data, of another start."""
-        self._worlds[number] = _World(self._models.at(row), self._pool.starts[row].addresses.servos)
-        self._rows[number] = row
-        self._words[number] = 0
-        self._servos[number // _GROUP] = None
-
-    def _at(self, number: int) -> _World:
-        world = self._worlds[number]
-        assert world is not None, f"world {number} has not been begun"
-        return world
-
-    def _step(
-        self, group: int, worlds: list[_World], targets: Float[np.ndarray, "worlds substeps 8"]
-    ) -> None:
-        """The physics steps of some worlds, side by side: NumPy is quicker with all of them at once."""
-        servos = self._servos[group]
-        if servos is None:
-            servos = self._servos[group] = ServoGroup([world.servos for world in worlds])
-        servos.read_set_points()
-        pairs = [(world.model, world.data) for world in worlds]
-        first_half, second_half = mujoco.mj_step1, mujoco.mj_step2
-        for substep in range(targets.shape[1]):
-            servos.follow(targets[:, substep])
-            for model, data in pairs:
-                # The second half of a step, then the first of the next, as the CPU's environment steps.
-                second_half(model, data)
-                first_half(model, data)
 
 
 def state_words(pool: StartPool) -> int:

@@ -101,7 +101,7 @@ def robustness(
             worlds,
             seed=seed,
             engine=chosen,
-            processes=jobs,
+            threads=jobs,
             on_progress=played,
         )
     said = document(task, variation, ended, engine=chosen, seed=seed)

@@ -76,7 +76,7 @@ def batched_results(
         specs = [config.episode_spec(task, number) for number in numbers]
         pool = draw_pool(config.env_config(task), specs)
         count = min(batch.worlds, len(numbers))
-        worlds = from_pool(pool, count, engine, processes=config.jobs)
+        worlds = from_pool(pool, count, engine, threads=config.jobs)
         _tell(policy, worlds, settings, task)
         for first in range(0, len(numbers), count):
             rows = list(range(first, min(first + count, len(numbers))))

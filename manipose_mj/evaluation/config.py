@@ -69,7 +69,7 @@ class EvaluationConfig:
       episodes: Number per task.
       seed: Base seed, from which every episode's own seed follows.
       pose: Where the baseline takes object poses from.
-      jobs: Episodes that run at the same time, each on one core; of the engine `c`, processes. Results do not
+      jobs: Episodes that run at the same time, each on one core; of the engine `c`, threads. Results do not
         depend on it.
       objects: What to use instead of the tasks' own objects: names of built-in ones, asset folders, or
         folders of them.

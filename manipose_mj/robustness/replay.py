@@ -48,7 +48,7 @@ def replays(
     *,
     seed: int = 0,
     engine: EngineName = "auto",
-    processes: int = 1,
+    threads: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Replay]:
     """Play plans in so many worlds, equally many of each plan; the first of each is the world it was made in.
@@ -59,7 +59,7 @@ def replays(
       worlds: How many in all.
       seed: Of the draws.
       engine: Of the physics.
-      processes: Of the engine `c`.
+      threads: Of the engine `c`.
       on_progress: Called with the number of worlds that have ended and that of all.
 
     Raises:
@@ -73,7 +73,7 @@ def replays(
     for part, size in _parts(plans, worlds):
         first = len(ended) < len(plans.plans)
         pool, drawn = _varied_pool(part, variation, size, rng, nominal=first)
-        ended += _played(part, pool, drawn, chosen, processes)
+        ended += _played(part, pool, drawn, chosen, threads)
         on_progress(len(ended), worlds)
     return ended
 
@@ -114,13 +114,13 @@ def _played(
     pool: StartPool,
     drawn: list[dict[str, float]],
     engine: EngineName,
-    processes: int,
+    threads: int,
 ) -> list[Replay]:
     actions = {plan.seed: plan.actions for plan in plans.plans}
     steps = max(len(each) for each in actions.values()) + AFTER
     longer = replace(pool.layout, horizon=max(steps + 1, pool.layout.horizon))
     pool = replace(pool, layout=longer)
-    worlds = from_pool(pool, len(pool.starts), engine, processes=processes)
+    worlds = from_pool(pool, len(pool.starts), engine, threads=threads)
     state = worlds.reset(jax.random.key(0))
     rows = np.asarray(state.row)
     sent = np.stack([_held(actions[start.seed], steps) for start in pool.starts])

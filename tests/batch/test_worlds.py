@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +12,6 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch
-from manipose_mj.batch.engine_c import _begin_all
 from manipose_mj.errors import InputError
 from tests.batch.batched import make, wandering
 
@@ -152,9 +148,9 @@ def test_a_saved_state_goes_on_alike_in_other_worlds(worlds, tmp_path):
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("processes", [1, 2])
-def test_closed_worlds_say_so(worlds, processes):
-    closed = batch.from_pool(worlds.pool, 3, "c", processes=processes)
+@pytest.mark.parametrize("threads", [1, 2])
+def test_closed_worlds_say_so(worlds, threads):
+    closed = batch.from_pool(worlds.pool, 3, "c", threads=threads)
     state, action = closed.at(np.array([7, 8, 7])), wandering(1, 3)[0]
     closed.close()
     late = (
@@ -196,27 +192,17 @@ def test_pools_are_read_back_as_they_were_written(worlds, tmp_path):
         batch.from_pool(tmp_path / "pool", 3)
 
 
-@pytest.mark.full
-def test_processes_change_nothing(worlds):
-    split = batch.from_pool(worlds.pool, 3, "c", processes=2)
-    action = wandering(1, 3)[0]
-    state = worlds.at([7, 8, 7])
-    equal(split.step(split.at([7, 8, 7]), action), worlds.step(state, action))
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_change_nothing(worlds, threads):
+    split = batch.from_pool(worlds.pool, 3, "c", threads=threads)
+    actions = wandering(6, 3)
+    actions[2, 1, 3] = np.nan  # that world diverges, and begins anew
+    last, seen = split.rollout(actions, split.at([7, 8, 7]))
+    expected, wanted = worlds.rollout(actions, worlds.at([7, 8, 7]))
+    equal(last, expected)
+    equal(seen, wanted)
+    assert np.asarray(seen.terminated).sum() == 1
     split.close()
-
-
-class Deadly:
-    """Ends the process that unpickles it, as a script without a guard does."""
-
-    def __reduce__(self):
-        return os._exit, (1,)
-
-
-@pytest.mark.full
-def test_processes_that_do_not_start_are_one_line():
-    executor = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
-    with pytest.raises(InputError, match="own work has to stand under if __name__"):
-        _begin_all([executor], cast(Any, Deadly()), [range(1)])
 
 
 @pytest.mark.full
@@ -240,7 +226,7 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
         ({"obs_mode": "state+rgb"}, "observation mode of batched worlds"),
         ({"control_mode": "primitive"}, "unknown control mode"),
         ({"seeds": ()}, "no seeds"),
-        ({"processes": 0}, "processes is 0"),
+        ({"threads": 0}, "threads is 0"),
     ):
         with pytest.raises(InputError, match=message):
             make(TASK, **arguments)

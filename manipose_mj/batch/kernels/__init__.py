@@ -1,1 +1,1 @@
-"""Kernels of the engine `warp`: our own, and all of them compiled ahead of the first step."""
+"""Code that is compiled: loops over worlds of the engine `c`; kernels of the engine `warp`, ahead of the first step."""

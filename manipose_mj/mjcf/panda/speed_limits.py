@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from manipose_mj.mjcf.panda.kinematics import (
     DH,
@@ -25,9 +25,7 @@ JOINT_LEADS = SERVO_LAG * VELOCITY_LIMITS  # [rad]
 TCP_LEAD = SERVO_LAG * TCP_SPEED_LIMIT  # [m]
 # The TCP is never further than this from each joint's axis [m].
 _LINKS = np.append(np.hypot(DH[1:, 0], DH[1:, 1]), FLANGE_OFFSET + TCP_OFFSET)
-_REACH = np.cumsum(_LINKS[::-1])[::-1]
-# A column of the Jacobian of the TCP changes by at most the shorter of two levers as another joint turns [m/rad].
-_CHANGE = np.minimum.outer(_REACH, _REACH)
+TCP_REACH = np.cumsum(_LINKS[::-1])[::-1]
 
 
 @lru_cache(maxsize=8)
@@ -58,9 +56,9 @@ def allowed_set_points(
     xp = namespace(targets)
     allowed = allowed_for_joints(targets, set_points, joints, most)
     leads = allowed - joints
-    if xp is not np or np.abs(leads).dot(_REACH) > TCP_LEAD:
-        motion = tcp_jacobian().dot(leads)
-        length = xp.sqrt(motion.dot(motion))
+    if xp is not np or np.abs(leads).dot(TCP_REACH) > TCP_LEAD:
+        motion = _sum_in_order(tcp_jacobian() * leads)
+        length = xp.sqrt(_sum_in_order(motion * motion))
         slowed = joints + (TCP_LEAD / xp.maximum(length, TCP_LEAD)) * leads
         allowed = xp.where(length > TCP_LEAD, slowed, allowed)
     return xp.minimum(xp.maximum(allowed, _LOWEST), _HIGHEST)
@@ -78,18 +76,6 @@ def allowed_for_joints(
     return xp.minimum(xp.maximum(allowed, joints - JOINT_LEADS), joints + JOINT_LEADS)
 
 
-def tcp_surely_slow(leads: Float[np.ndarray, "*b 7"]) -> Bool[np.ndarray, "*b"]:
-    """Whether set-points so far ahead of the joints [rad] cannot drive the TCP too fast, however the arm is bent."""
-    return np.abs(leads) @ _REACH < (1 - 1e-9) * TCP_LEAD
-
-
-def tcp_motion_change(
-    leads: Float[np.ndarray, "*b 7"], turned: Float[np.ndarray, "*b 7"]
-) -> Float[np.ndarray, "*b"]:
-    """By how much the TCP's motion for such leads can change as the joints turn [m], at most.
-
-    Args:
-      leads: Set-points' ahead of the joints [rad].
-      turned: By how much the joints turn [rad].
-    """
-    return ((np.abs(turned) @ _CHANGE) * np.abs(leads)).sum(axis=-1)
+def _sum_in_order(values: Float[Array, "*b n"]) -> Float[Array, "*b"]:
+    """Sums whose bits in NumPy depend on no processor, as those of a product by BLAS do."""
+    return values.cumsum(axis=-1)[..., -1] if namespace(values) is np else values.sum(axis=-1)

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_ASLEEP = (
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+ASLEEP = (
     "tree_asleep",
     "tree_awake",
     "body_awake",
@@ -17,10 +17,10 @@ _ASLEEP = (
     "parent_awake_ind",
     "dof_awake_ind",
 )
-_AWAKE_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
+AWAKE_COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
 # What the second half of the last step computed, which observations show; and the servos' speeds, which
 # dm_control leaves at zero when it resets.
-_LEFT_BEHIND = ("actuator_velocity", "actuator_force", "qacc", "sensordata")
+LEFT_BEHIND = ("actuator_velocity", "actuator_force", "qacc", "sensordata")
 
 
 @dataclass(frozen=True)
@@ -49,40 +49,19 @@ class SimulationState:
 
 def state_size(model: mujoco.MjModel) -> int:
     """Length of a simulation's `state`."""
-    return mujoco.mj_stateSize(model, _STATE)
+    return mujoco.mj_stateSize(model, STATE)
 
 
 def read_simulation(model: mujoco.MjModel, data: mujoco.MjData) -> SimulationState:
     """The present of a simulation, between two steps."""
     state = np.empty(state_size(model))
-    mujoco.mj_getState(model, data, state, _STATE)
+    mujoco.mj_getState(model, data, state, STATE)
     return SimulationState(
         state=state,
-        asleep={name: np.array(getattr(data, name)) for name in _ASLEEP},
-        awake={name: int(getattr(data, name)) for name in _AWAKE_COUNTS},
-        left_behind={name: np.array(getattr(data, name)) for name in _LEFT_BEHIND},
+        asleep={name: np.array(getattr(data, name)) for name in ASLEEP},
+        awake={name: int(getattr(data, name)) for name in AWAKE_COUNTS},
+        left_behind={name: np.array(getattr(data, name)) for name in LEFT_BEHIND},
     )
-
-
-class FlatReader:
-    """Reads one simulation again and again, as `read_simulation(...).flat()` does, from views made once."""
-
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        self._model, self._data = model, data
-        self._size = state_size(model)
-        self._counts = np.empty(len(_AWAKE_COUNTS))
-        asleep, left = (
-            [getattr(data, name).reshape(-1) for name in names] for names in (_ASLEEP, _LEFT_BEHIND)
-        )
-        self._rest = [*asleep, self._counts, *left]
-        self._end = self._size + sum(map(len, self._rest))
-
-    def read_into(self, flat: Float[np.ndarray, "m"]) -> None:
-        """Write the present into an array; what is longer than the model needs stays as it is."""
-        data = self._data
-        mujoco.mj_getState(self._model, data, flat[: self._size], _STATE)
-        self._counts[:] = data.ntree_awake, data.nbody_awake, data.nparent_awake, data.nv_awake
-        np.concatenate(self._rest, out=flat[self._size : self._end])
 
 
 def unflatten(
@@ -104,14 +83,14 @@ def unflatten(
 
     state = next_values(state_size(model))
     asleep = {}
-    for name in _ASLEEP:
+    for name in ASLEEP:
         own = getattr(data, name)
         asleep[name] = next_values(own.size).astype(own.dtype)
     return SimulationState(
         state=state,
         asleep=asleep,
-        awake={name: int(next_values(1)[0]) for name in _AWAKE_COUNTS},
-        left_behind={name: next_values(getattr(data, name).size) for name in _LEFT_BEHIND},
+        awake={name: int(next_values(1)[0]) for name in AWAKE_COUNTS},
+        left_behind={name: next_values(getattr(data, name).size) for name in LEFT_BEHIND},
     )
 
 
@@ -120,14 +99,14 @@ def write_simulation(
 ) -> None:
     """Put a simulation back; what follows is the same, bit for bit."""
     mujoco.mj_resetData(model, data)
-    mujoco.mj_setState(model, data, simulation.state, _STATE)
+    mujoco.mj_setState(model, data, simulation.state, STATE)
     # Who sleeps is no part of MuJoCo's state: bodies that do are not moved, so all are put in place first.
     mujoco.mj_forward(model, data)
     for name, values in simulation.asleep.items():
         getattr(data, name)[:] = values
     for name, count in simulation.awake.items():
         setattr(data, name, count)
-    mujoco.mj_setState(model, data, simulation.state, _STATE)
+    mujoco.mj_setState(model, data, simulation.state, STATE)
     # The first half of a step: what dm_control leaves behind after each.
     mujoco.mj_step1(model, data)
     for name, values in simulation.left_behind.items():

@@ -1,0 +1,259 @@
+"""Loops over worlds of the engine `c`, which call MuJoCo; Numba compiles them at the first call and keeps them.
+
+A Python call, and NumPy on arrays of seven numbers, cost as much as a tenth of a physics step. These loops hold no
+lock of Python's, so threads run them side by side. MuJoCo's warnings go where they always go; an error of MuJoCo's, such
+as a stack without room, ends the process with its message.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import mujoco
+import numpy as np
+from llvmlite import ir
+from numba import njit
+from numba.core import types
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+
+from manipose_mj.assets.franka_hand import MAX_OPENING
+from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
+from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, TCP_REACH
+from manipose_mj.tasks.core.simulation_state import STATE
+from manipose_mj.tasks.scene.indices import FIRST, RIGHT_PAD
+
+_LIBRARY = re.compile(r"(lib)?mujoco[.\d]*(\.so[.\d]*|\.dylib|\.dll)")
+_FUNCTIONS = ("mj_step1", "mj_step2", "mj_jacSite", "mj_getState")
+_LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
+_REACH = np.ascontiguousarray(TCP_REACH)  # or Numba would not keep what it compiles
+_STATE = int(STATE)
+# What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
+_DIVERGED = tuple(
+    int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
+    for name in ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+)
+# The TCP moves less than its joints sweep, whatever rounding does to either.
+_SURELY_SLOW = (1 - 1e-9) * TCP_LEAD
+
+
+class Robots(NamedTuple):
+    """Where each world's robot is; rows are worlds. Addresses are numbers of bytes.
+
+    Attributes:
+      models, datas: Addresses of MuJoCo's model and data.
+      angles, controls, openings: Of the arm's angles in `qpos`, its controls, and the hand's control.
+      jacobians: Of room for three rows of the site's Jacobian.
+      velocities: Numbers of degrees of freedom.
+      arms: The first of the arm's.
+      sites: The TCP.
+      most: How far a set-point of the arm may move in a step [rad].
+    """
+
+    models: np.ndarray
+    datas: np.ndarray
+    angles: np.ndarray
+    controls: np.ndarray
+    openings: np.ndarray
+    jacobians: np.ndarray
+    velocities: np.ndarray
+    arms: np.ndarray
+    sites: np.ndarray
+    most: np.ndarray
+
+
+class Tables(NamedTuple):
+    """Where each world's values are; rows are worlds. Addresses are numbers of bytes.
+
+    Attributes:
+      robots: With the worlds' models and data.
+      measured: Addresses of what a measurement is made of, in its order.
+      states: Numbers of values that MuJoCo's state has.
+      whole, real: Addresses of what else belongs to a world's state: integers, then doubles.
+      wholes, reals: How many are at each.
+      contacts: Address of the first contact's geoms; 0 until there was one.
+      contact_bytes: From one contact to the next.
+      warnings: Address of the first counter of warnings.
+      warning_bytes: From one to the next.
+      owners: Of each geom, as in `Addresses`.
+    """
+
+    robots: Robots
+    measured: np.ndarray
+    states: np.ndarray
+    whole: np.ndarray
+    real: np.ndarray
+    wholes: np.ndarray
+    reals: np.ndarray
+    contacts: np.ndarray
+    contact_bytes: np.ndarray
+    warnings: np.ndarray
+    warning_bytes: np.ndarray
+    owners: np.ndarray
+
+
+def _symbols() -> None:
+    """Lets compiled code find MuJoCo's functions by their names, in the library that `mujoco` has loaded."""
+    folder = Path(str(mujoco.__file__)).parent
+    libraries = [path for path in folder.iterdir() if _LIBRARY.fullmatch(path.name)]
+    assert len(libraries) == 1, f"{folder}: {len(libraries)} libraries of MuJoCo, expected one"
+    library = ctypes.CDLL(str(libraries[0]))
+    for name in _FUNCTIONS:
+        address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+        assert address is not None
+        llvm.add_symbol(name, address)
+
+
+def _compiled(loop: Callable) -> Any:
+    """A loop that Numba compiles; kept for the next process, unless it finds no folder that it may write."""
+    try:
+        return njit(nogil=True, cache=True)(loop)
+    except RuntimeError:
+        return njit(nogil=True)(loop)
+
+
+_symbols()
+_POINTER = types.uintp
+_step1 = types.ExternalFunction("mj_step1", types.void(_POINTER, _POINTER))
+_step2 = types.ExternalFunction("mj_step2", types.void(_POINTER, _POINTER))
+_site_jacobian = types.ExternalFunction(
+    "mj_jacSite", types.void(_POINTER, _POINTER, _POINTER, _POINTER, types.int32)
+)
+_get_state = types.ExternalFunction(
+    "mj_getState", types.void(_POINTER, _POINTER, _POINTER, types.int32)
+)
+
+
+def _pointer_to(kind: Any) -> Any:
+    @intrinsic
+    def pointer(_: Any, address: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+        return types.CPointer(kind)(address), generate
+
+    return pointer
+
+
+_doubles, _integers = _pointer_to(types.float64), _pointer_to(types.int32)
+
+
+@_compiled
+def step(robots: Robots, targets: Any, first: int, end: int) -> None:
+    """Physics steps of some worlds, one world after the other.
+
+    Args:
+      robots: Of all worlds.
+      targets: Joint angles [rad] and openings [m], (worlds, substeps, 8).
+      first: World that is stepped; end: Not stepped any more.
+    """
+    room = np.empty(7)
+    for world in range(first, end):
+        model, data = robots.models[world], robots.datas[world]
+        for substep in range(targets.shape[1]):
+            follow(robots, world, targets[world, substep], room)
+            # The second half of a step, then the first of the next, as the CPU's environment steps.
+            _step2(model, data)
+            _step1(model, data)
+
+
+@_compiled
+def follow(robots: Robots, world: int, target: Any, allowed: Any) -> None:
+    """Moves a world's set-points as `Servos.follow` does, bit for bit; `allowed` is room for seven numbers."""
+    angles = carray(_doubles(robots.angles[world]), 7)
+    control = carray(_doubles(robots.controls[world]), 7)
+    swept = 0.0
+    for j in range(7):
+        most, lead = robots.most[world, j], JOINT_LEADS[j]
+        value = np.minimum(np.maximum(target[j], control[j] - most), control[j] + most)
+        value = np.minimum(np.maximum(value, angles[j] - lead), angles[j] + lead)
+        allowed[j] = value
+        swept += abs(value - angles[j]) * _REACH[j]
+    if swept >= _SURELY_SLOW:
+        _slow_down(robots, world, angles, allowed)
+    for j in range(7):
+        control[j] = np.minimum(np.maximum(allowed[j], _LOWEST[j]), _HIGHEST[j])
+    opening = carray(_doubles(robots.openings[world]), 1)
+    opening[0] = np.minimum(np.maximum(target[7], 0.0), MAX_OPENING)
+
+
+@_compiled
+def _slow_down(robots: Robots, world: int, angles: Any, allowed: Any) -> None:
+    """Draws set-points nearer to the joints where the TCP would move too fast, as `allowed_set_points` does."""
+    model, data, address = robots.models[world], robots.datas[world], robots.jacobians[world]
+    _site_jacobian(model, data, address, np.uintp(0), robots.sites[world])
+    jacobian = carray(_doubles(address), (3, robots.velocities[world]))
+    first, squares = robots.arms[world], 0.0
+    for row in range(3):
+        motion = 0.0
+        for j in range(7):
+            motion += jacobian[row, first + j] * (allowed[j] - angles[j])
+        squares += motion * motion
+    length = np.sqrt(squares)
+    if length > TCP_LEAD:
+        share = TCP_LEAD / length
+        for j in range(7):
+            allowed[j] = angles[j] + share * (allowed[j] - angles[j])
+
+
+@_compiled
+def read(tables: Tables, awake: Any, states: Any) -> None:
+    """All states, as `SimulationState.flat` has them; what is longer stays as it is.
+
+    Args:
+      tables: Of all worlds.
+      awake: Counts of what is awake, (worlds, 4).
+      states: To be written, (worlds, values).
+    """
+    for world in range(len(states)):
+        flat = states[world]
+        model, data = tables.robots.models[world], tables.robots.datas[world]
+        _get_state(model, data, flat.ctypes.data, np.int32(_STATE))
+        place = tables.states[world]
+        for k in range(tables.whole.shape[1]):
+            count = tables.wholes[world, k]
+            integers = carray(_integers(tables.whole[world, k]), count)
+            for i in range(count):
+                flat[place + i] = integers[i]
+            place += count
+        for k in range(awake.shape[1]):
+            flat[place + k] = awake[world, k]
+        place += awake.shape[1]
+        for k in range(tables.real.shape[1]):
+            count = tables.reals[world, k]
+            doubles = carray(_doubles(tables.real[world, k]), count)
+            for i in range(count):
+                flat[place + i] = doubles[i]
+            place += count
+
+
+@_compiled
+def measure(tables: Tables, counts: Any, values: Any, touched: Any, diverged: Any) -> None:
+    """What `measurement.measure` gives, of all worlds, and which of them MuJoCo warns of.
+
+    Args:
+      tables: Of all worlds.
+      counts: Of contacts.
+      values, touched: Of a `FlatMeasurement`, to be written; nothing is touched yet.
+      diverged: To be written.
+    """
+    for world in range(len(values)):
+        for k in range(values.shape[1]):
+            values[world, k] = carray(_doubles(tables.measured[world, k]), 1)[0]
+        for contact in range(counts[world]):
+            address = tables.contacts[world] + np.uintp(contact) * tables.contact_bytes[world]
+            geoms = carray(_integers(address), 2)
+            one, other = tables.owners[world, geoms[0]], tables.owners[world, geoms[1]]
+            kind, slot = min(one, other), max(one, other)
+            if kind <= RIGHT_PAD and slot >= FIRST:
+                touched[world, kind, slot - FIRST] = True
+        diverged[world] = False
+        for warning in _DIVERGED:
+            address = tables.warnings[world] + np.uintp(warning) * tables.warning_bytes[world]
+            if carray(_integers(address), 1)[0] > 0:
+                diverged[world] = True

@@ -1,0 +1,121 @@
+"""Where in memory each world's values are, for the compiled loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from manipose_mj.batch.kernels.cpu_loops import Robots, Tables
+from manipose_mj.batch.measurement import flat_values, gathered
+from manipose_mj.batch.starts import Start, StartPool
+from manipose_mj.mjcf.panda.servos import Servos
+from manipose_mj.mjcf.panda.speed_limits import most_motion
+from manipose_mj.tasks.core.simulation_state import ASLEEP, LEFT_BEHIND, state_size
+from manipose_mj.tasks.scene.indices import NOBODY
+
+
+class _Addresses:
+    """In place of each of MuJoCo's arrays, the addresses of its values, in the same shape."""
+
+    def __init__(self, data: mujoco.MjData) -> None:
+        self._data = data
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        array = getattr(self._data, name)
+        return array.ctypes.data + array.itemsize * np.arange(array.size).reshape(array.shape)
+
+
+def empty_tables(pool: StartPool, worlds: int) -> Tables:
+    """Tables of so many worlds, none of which is in them yet."""
+    geoms = max(model.ngeom for model in pool.scenes)
+    values = len(flat_values(pool.starts[0].measurement))
+
+    def addresses(*shape: int) -> np.ndarray:
+        return np.zeros((worlds, *shape), np.uintp)
+
+    def numbers(*shape: int) -> np.ndarray:
+        return np.zeros((worlds, *shape), int)
+
+    return Tables(
+        robots=empty_robots(worlds),
+        measured=addresses(values),
+        states=numbers(),
+        whole=addresses(len(ASLEEP)),
+        real=addresses(len(LEFT_BEHIND)),
+        wholes=numbers(len(ASLEEP)),
+        reals=numbers(len(LEFT_BEHIND)),
+        contacts=addresses(),
+        contact_bytes=addresses(),
+        warnings=addresses(),
+        warning_bytes=addresses(),
+        owners=np.full((worlds, geoms), NOBODY),
+    )
+
+
+def empty_robots(worlds: int) -> Robots:
+    """The robots of so many worlds, none of which is known yet."""
+    models, datas, angles, controls, openings, jacobians = np.zeros((6, worlds), np.uintp)
+    velocities, arms = np.zeros((2, worlds), int)
+    sites, most = np.zeros(worlds, np.int32), np.zeros((worlds, 7))
+    return Robots(
+        models, datas, angles, controls, openings, jacobians, velocities, arms, sites, most
+    )
+
+
+def enter_robot(robots: Robots, world: int, servos: Servos) -> None:
+    """Writes where a world's robot is.
+
+    Args:
+      robots: To be written.
+      world: Its number.
+      servos: Of its robot, which have its model and data. They have to be kept as long as the tables are used.
+    """
+    model, at = servos.model, servos.at
+    robots.models[world] = model._address
+    robots.datas[world] = servos.data._address
+    robots.angles[world] = servos.joint_angles.ctypes.data
+    robots.controls[world] = servos.control.ctypes.data
+    robots.openings[world] = servos.opening.ctypes.data
+    robots.jacobians[world] = servos.jacobian.ctypes.data
+    robots.velocities[world] = model.nv
+    robots.arms[world] = at.dofs.start
+    robots.sites[world] = at.tcp
+    robots.most[world] = most_motion(model.opt.timestep)
+
+
+def enter(tables: Tables, world: int, start: Start, servos: Servos) -> None:
+    """Writes where a world is.
+
+    Args:
+      tables: To be written.
+      world: Its number.
+      start: Its start.
+      servos: As of `enter_robot`.
+    """
+    enter_robot(tables.robots, world, servos)
+    data = servos.data
+    none = np.zeros(start.measurement.contacts.shape, bool)
+    addresses: Any = _Addresses(data)
+    tables.measured[world] = flat_values(gathered(addresses, start.addresses, none))
+    tables.states[world] = state_size(servos.model)
+    whole, real = ([getattr(data, name) for name in names] for names in (ASLEEP, LEFT_BEHIND))
+    assert all(array.dtype == np.int32 for array in whole)
+    tables.whole[world] = [array.ctypes.data for array in whole]
+    tables.real[world] = [array.ctypes.data for array in real]
+    tables.wholes[world] = [array.size for array in whole]
+    tables.reals[world] = [array.size for array in real]
+    tables.contacts[world] = 0
+    warnings = data.warning.number
+    tables.warnings[world], tables.warning_bytes[world] = warnings.ctypes.data, warnings.strides[0]
+    owners = start.addresses.owners
+    tables.owners[world] = NOBODY
+    tables.owners[world, : len(owners)] = owners
+
+
+def enter_contacts(tables: Tables, world: int, data: mujoco.MjData) -> None:
+    """Writes where a world's contacts are: at the beginning of MuJoCo's arena, once there was one."""
+    geoms = data.contact.geom
+    tables.contacts[world] = geoms.ctypes.data
+    tables.contact_bytes[world] = geoms.strides[0]

@@ -1,0 +1,52 @@
+"""Compiled loops move set-points as the servos of a single robot do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from dm_control import mjcf
+
+from manipose_mj.batch.kernels.cpu_loops import follow
+from manipose_mj.batch.world_tables import empty_robots, enter_robot
+from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
+from manipose_mj.mjcf.panda.robot import HOME, Panda
+from manipose_mj.mjcf.panda.servos import Servos
+from manipose_mj.mjcf.panda.speed_limits import TCP_LEAD
+
+ROBOTS = 200
+
+
+def test_set_points_move_bit_for_bit():
+    panda = Panda()
+    physics = mjcf.Physics.from_mjcf_model(panda.mjcf_model)
+    model, at = physics.model.ptr, panda.servos(physics).at
+    rng = np.random.default_rng(0)
+    robots = empty_robots(1)
+    slowed = stopped = 0
+    for i in range(ROBOTS):
+        scale = (0.001, 0.05, 0.5)[i % 3]
+        joints = np.clip(HOME + rng.normal(0, 0.5, 7), *POSITION_LIMITS.T)
+        controls = joints + rng.normal(0, scale, 7)
+        compiled, plain = (servos_at(model, at, joints, controls) for _ in range(2))
+        target = np.append(HOME + rng.normal(0, 1.0, 7), rng.uniform(-0.02, 0.1))
+        if i % 50 == 0:
+            target[i // 50] = np.nan
+        enter_robot(robots, 0, compiled)
+        follow(robots, 0, target, np.empty(7))
+        plain.follow(target)
+        np.testing.assert_array_equal(compiled.control, plain.control)
+        assert compiled.opening[0] == plain.opening[0]
+        lead = plain.tcp_jacobian() @ (plain.control - plain.joint_angles)
+        slowed += bool(np.linalg.norm(lead) > 0.999 * TCP_LEAD)
+        stopped += bool(np.isnan(plain.control).any())
+    assert 20 < slowed < ROBOTS - 20 and stopped == ROBOTS // 50
+
+
+def servos_at(model: mujoco.MjModel, at: Any, joints: np.ndarray, controls: np.ndarray) -> Servos:
+    data = mujoco.MjData(model)
+    data.qpos[at.angles], data.ctrl[at.arm] = joints, controls
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return Servos.of(model, data, at)
