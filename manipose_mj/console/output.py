@@ -34,6 +34,11 @@ def write_json(document: Any) -> None:
     sys.stdout.write(json.dumps(_finite(document), indent=1, allow_nan=False) + "\n")
 
 
+def figure(value: float, form: str) -> str:
+    """A figure of a table in the form of `format`; a dash where there is none to give."""
+    return format(value, form) if math.isfinite(value) else "-"
+
+
 def _finite(document: Any) -> Any:
     if isinstance(document, dict):
         return {name: _finite(value) for name, value in document.items()}

@@ -224,8 +224,8 @@ def evaluate_articulated(
             str(row["views"]),
             str(row["category"]),
             str(row["n"]),
-            *(f"{row[name]:.0%}" for name in shares.values()),
-            *(f"{row[name]:.2f}" for name in medians.values()),
+            *(output.figure(row[name], ".0%") for name in shares.values()),
+            *(output.figure(row[name], ".2f") for name in medians.values()),
         )
     output.standard_output().print(table)
     return 0

@@ -51,4 +51,5 @@ class ShutGoal(Goal):
     def progress(self, state: SceneState, tolerance: Tolerance) -> Float[Array, "*b"]:
         """Reach, shut."""
         part = state.parts[self.part]
-        return stages.part_progress(state, part, 1 - part.fraction)
+        enough = 1.0 if self.fraction is None else self.fraction
+        return stages.part_progress(state, part, (1 - part.fraction) / enough)

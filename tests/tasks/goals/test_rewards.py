@@ -91,6 +91,15 @@ def test_opening_and_shutting_mirror_each_other():
     assert _rewards((OpenGoal("drawer", 0.9),), states)[-1] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("fraction", [0.4, 0.9])
+def test_a_part_shut_as_far_as_asked_has_all_its_reward(fraction):
+    just, wide = (_state((0, 0, 0), (0, 0, 0), opening=o) for o in (0.2 * (1 - fraction), 0.2))
+    shut = ShutGoal("drawer", fraction)
+    assert shut.met(just, Tolerance()) and not shut.met(wide, Tolerance())
+    progress = [float(shut.progress(state, Tolerance())) for state in (just, wide)]
+    assert progress[0] == pytest.approx(1.0) and progress[1] < 0.4
+
+
 def test_several_objects_count_side_by_side():
     here, there = _state((0.5, 0, 0.05), (0, 0, 0.5)), _state((0.2, 0, 0.05), (0, 0, 0.5))
     mixed = SceneState(
