@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from manipose_mj.batch.simulator import Simulator, packed, state_words
 from manipose_mj.batch.starts import RowModels, StartPool, awake
+from manipose_mj.console.process import CORES
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
@@ -85,11 +85,13 @@ def probe(pool: StartPool) -> Peaks:
     Args:
       pool: Of starts; those that are played have from the fewest to the most contacts when they begin.
     """
+    from manipose_mj.batch.simulator import Simulator, packed, state_words  # Numba is slow to load
+
     pool = replace(pool, scenes=tuple(awake(scene) for scene in pool.scenes))
     counter = _Counter(pool)
     rows = counter.spread(min(PROBED, len(pool.starts)))
     starts = [pool.starts[row] for row in rows]
-    simulator, size = Simulator(pool, len(rows)), state_words(pool)
+    simulator, size = Simulator(pool, len(rows), threads=CORES), state_words(pool)
     first = np.stack([packed(start.simulation, size) for start in starts])
     words, rng = first.copy(), np.random.default_rng(pool.seeds)
     down = [start.measurement.tcp_rotation for start in starts]
@@ -111,6 +113,7 @@ def probe(pool: StartPool) -> Peaks:
                 targets[world, 7] = MAX_OPENING if phase < 2 else 0.0
         if step >= sum(_PHASES) and (step - sum(_PHASES)) % _HELD == 0:
             targets = _drawn(rng, len(rows))
+    simulator.close()
     jointed = max(_parts(pool.scenes[start.scene], start.addresses.servos) for start in pool.starts)
     return Peaks(peaks[:, 0], peaks[:, 1], jointed)
 

@@ -92,7 +92,7 @@ def from_pool(
         from manipose_mj.batch.engine_warp import WarpEngine  # only where its libraries are
 
         return Worlds(pool, WarpEngine(pool, worlds, capacity, visual=visual), worlds)
-    from manipose_mj.batch.engine_c import CEngine  # Numba takes half a second
+    from manipose_mj.batch.engine_c import CEngine  # Numba is slow to load
 
     return Worlds(pool, CEngine(pool, worlds, threads=threads), worlds)
 

@@ -6,7 +6,9 @@ caller goes on from another one, it is put back first: stepping is a function of
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
+from itertools import pairwise
 from operator import attrgetter
 
 import mujoco
@@ -16,7 +18,8 @@ from jaxtyping import Bool, Float, Int, UInt32
 from manipose_mj.batch.kernels.cpu_loops import measure, read, step
 from manipose_mj.batch.measurement import FlatMeasurement, flat_values
 from manipose_mj.batch.starts import RowModels, StartPool
-from manipose_mj.batch.world_tables import empty_tables, enter, enter_contacts
+from manipose_mj.batch.world_tables import constants, empty_tables, enter, enter_contacts
+from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.servos import Servos
 from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS, unflatten, write_simulation
 
@@ -34,7 +37,8 @@ class Simulator:
           worlds: How many.
           threads: That step them.
         """
-        self._pool = pool
+        self._pool, self._constants = pool, constants()
+        self._lock, self._closed = threading.Lock(), False
         self._models, self._tables = RowModels(pool), empty_tables(pool, worlds)
         self._servos: list[Servos | None] = [None] * worlds
         self._datas: list[mujoco.MjData | None] = [None] * worlds
@@ -60,19 +64,27 @@ class Simulator:
 
         Returns:
           Their states, whether each diverged (its state is then without meaning), and measurements.
+
+        Raises:
+          InputError: The simulator is closed.
         """
-        for i in np.flatnonzero(self._rows != rows).tolist():
-            self._begin(i, int(rows[i]))
-        for i in np.flatnonzero((self._words != words).any(axis=1)).tolist():
-            model, data = self.held(i)
-            write_simulation(model, data, unflatten(model, data, words[i].copy().view(float)))
-        robots = self._tables.robots
-        if self._threads is None:
-            step(robots, targets, 0, len(rows))
-        else:
-            firsts, ends = self._bounds[:-1], self._bounds[1:]
-            list(self._threads.map(lambda a, b: step(robots, targets, a, b), firsts, ends))
-        return self._seen(rows)
+        # One call at a time, as there is one set of data.
+        with self._lock:
+            if self._closed:
+                raise InputError("these worlds were closed")
+            for i in np.flatnonzero(self._rows != rows).tolist():
+                self._begin(i, int(rows[i]))
+            others = np.flatnonzero((self._words != words).any(axis=1)).tolist()
+            self._rows[:] = -1  # if the rest is interrupted, all worlds begin anew
+            for i in others:
+                model, data = self.held(i)
+                state = unflatten(model, data, words[i].copy().view(float))
+                write_simulation(model, data, state)
+            self._step(targets)
+            states, diverged, measured = self._seen(rows)
+            self._words[:] = states
+            self._rows[:] = np.where(diverged, -1, rows)
+            return states, diverged, measured
 
     def held(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The model and data of a world that has made a step and did not diverge in it."""
@@ -80,12 +92,34 @@ class Simulator:
         return servos.model, servos.data
 
     def close(self) -> None:
-        """Ends the threads."""
-        if self._threads is not None:
-            self._threads.shutdown()
+        """Ends the threads and forgets all worlds."""
+        with self._lock:
+            self._closed = True
+            if self._threads is not None:
+                self._threads.shutdown()
+            self._rows[:] = -1
+            self._servos[:] = [None] * len(self._rows)
+            self._datas[:] = [None] * len(self._rows)
+
+    def _step(self, targets: Float[np.ndarray, "worlds substeps 8"]) -> None:
+        robots = self._tables.robots
+        if self._threads is None:
+            step(self._constants, robots, targets, 0, len(targets))
+            return
+        running = [
+            self._threads.submit(step, self._constants, robots, targets, first, end)
+            for first, end in pairwise(self._bounds)
+        ]
+        try:
+            wait(running)
+        finally:
+            wait(running)  # for what goes on after an interruption, and has the data
+        for each in running:
+            each.result()
 
     def _begin(self, number: int, row: int) -> None:
         """Give a world new data, of another start."""
+        self._rows[number] = -1
         model = self._models.at(row)
         start = self._pool.starts[row]
         servos = Servos.of(model, mujoco.MjData(model), start.addresses.servos)
@@ -108,7 +142,7 @@ class Simulator:
         states = np.zeros_like(self._words)
         counts = np.array(list(map(_COUNTS, datas)))
         contacts = counts[:, 0]
-        read(tables, counts[:, 1:], states.view(float))
+        read(self._constants, tables, counts[:, 1:], states.view(float))
         for i in np.flatnonzero((contacts > 0) & (tables.contacts == 0)).tolist():
             enter_contacts(tables, i, datas[i])
         measured = FlatMeasurement(
@@ -116,13 +150,11 @@ class Simulator:
             np.zeros((len(rows), *self._touched), bool),
         )
         diverged = np.empty(len(rows), bool)
-        measure(tables, contacts, *measured, diverged)
+        measure(self._constants, tables, contacts, *measured, diverged)
         for i in np.flatnonzero(diverged).tolist():
-            self._rows[i] = -1
             states[i] = 0
             start = self._pool.starts[rows[i]].measurement
             measured.values[i], measured.contacts[i] = flat_values(start), start.contacts
-        self._words[:] = states
         return states, diverged, measured
 
 

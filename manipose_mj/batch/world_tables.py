@@ -7,13 +7,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from manipose_mj.batch.kernels.cpu_loops import Robots, Tables
+from manipose_mj.assets.franka_hand import MAX_OPENING
+from manipose_mj.batch.kernels.cpu_loops import Constants, Robots, Tables
 from manipose_mj.batch.measurement import flat_values, gathered
 from manipose_mj.batch.starts import Start, StartPool
+from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.servos import Servos
-from manipose_mj.mjcf.panda.speed_limits import most_motion
-from manipose_mj.tasks.core.simulation_state import ASLEEP, LEFT_BEHIND, state_size
-from manipose_mj.tasks.scene.indices import NOBODY
+from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, TCP_REACH, most_motion
+from manipose_mj.tasks.core.simulation_state import ASLEEP, LEFT_BEHIND, STATE, state_size
+from manipose_mj.tasks.scene.indices import FIRST, NOBODY, RIGHT_PAD
+
+# What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
+_DIVERGED = ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
 
 
 class _Addresses:
@@ -25,6 +30,23 @@ class _Addresses:
     def __getattr__(self, name: str) -> np.ndarray:
         array = getattr(self._data, name)
         return array.ctypes.data + array.itemsize * np.arange(array.size).reshape(array.shape)
+
+
+def constants() -> Constants:
+    """As the task's own modules have them."""
+    lowest, highest = POSITION_LIMITS.T.copy()
+    return Constants(
+        lowest=lowest,
+        highest=highest,
+        joint_leads=JOINT_LEADS,
+        reach=np.ascontiguousarray(TCP_REACH),
+        tcp_lead=float(TCP_LEAD),
+        max_opening=float(MAX_OPENING),
+        state=int(STATE),
+        warnings=np.array([int(getattr(mujoco.mjtWarning, f"mjWARN_{n}")) for n in _DIVERGED]),
+        right_pad=RIGHT_PAD,
+        first=FIRST,
+    )
 
 
 def empty_tables(pool: StartPool, worlds: int) -> Tables:

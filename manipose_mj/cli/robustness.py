@@ -56,7 +56,7 @@ def robustness(
       shift_cm: Most by which objects and furniture stand, as one, beside where the plan has them.
       turn_deg: Most by which they are turned about the first object; this carries what stands beside it farther than shift_cm.
       objects: What plans recorded now draw from: names of built-in objects, asset folders, or folders of them.
-      jobs: Processes.
+      jobs: Processes that record plans, and threads of the engine `c` that replay them.
     """
     prepare_workers(jobs)
     compile_at_once_on_gpus()

@@ -9,7 +9,7 @@ import numpy as np
 from dm_control import mjcf
 
 from manipose_mj.batch.kernels.cpu_loops import follow
-from manipose_mj.batch.world_tables import empty_robots, enter_robot
+from manipose_mj.batch.world_tables import constants, empty_robots, enter_robot
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, Panda
 from manipose_mj.mjcf.panda.servos import Servos
@@ -34,7 +34,7 @@ def test_set_points_move_bit_for_bit():
         if i % 50 == 0:
             target[i // 50] = np.nan
         enter_robot(robots, 0, compiled)
-        follow(robots, 0, target, np.empty(7))
+        follow(constants(), robots, 0, target, np.empty(7))
         plain.follow(target)
         np.testing.assert_array_equal(compiled.control, plain.control)
         assert compiled.opening[0] == plain.opening[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch
+from manipose_mj.batch.simulator import Simulator
 from manipose_mj.errors import InputError
 from tests.batch.batched import make, wandering
 
@@ -192,17 +194,58 @@ def test_pools_are_read_back_as_they_were_written(worlds, tmp_path):
         batch.from_pool(tmp_path / "pool", 3)
 
 
+def diverging(worlds: batch.Worlds) -> batch.State:
+    """Three worlds, of which the second is about to diverge."""
+    state = worlds.at([7, 8, 7])
+    model = worlds.pool.scenes[worlds.pool.starts[1].scene]
+    broken = np.array(state.simulation)
+    broken[1].view(float)[1 + model.nq : 1 + model.nq + model.nv] = 1e12  # after the time and qpos
+    return state._replace(simulation=jnp.asarray(broken))
+
+
 @pytest.mark.parametrize("threads", [2, 5])
 def test_threads_change_nothing(worlds, threads):
     split = batch.from_pool(worlds.pool, 3, "c", threads=threads)
     actions = wandering(6, 3)
-    actions[2, 1, 3] = np.nan  # that world diverges, and begins anew
-    last, seen = split.rollout(actions, split.at([7, 8, 7]))
-    expected, wanted = worlds.rollout(actions, worlds.at([7, 8, 7]))
+    last, seen = split.rollout(actions, diverging(split))
+    expected, wanted = worlds.rollout(actions, diverging(worlds))
     equal(last, expected)
     equal(seen, wanted)
     assert np.asarray(seen.terminated).sum() == 1
     split.close()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_callers_in_several_threads_wait_for_one_another(worlds, threads):
+    made = batch.from_pool(worlds.pool, 3, "c", threads=threads)
+    state, actions = worlds.at([7, 8, 7]), wandering(8, 3)
+    expected = [worlds.step(state, action).simulation for action in actions]
+    with ThreadPoolExecutor(4) as callers:
+        found = list(callers.map(lambda action: made.step(state, action).simulation, actions))
+    equal(found, expected)
+    made.close()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_after_an_interruption_states_are_still_what_they_were(worlds, threads, monkeypatch):
+    simulator = Simulator(worlds.pool, 3, threads=threads)
+    words = np.asarray(worlds.at([7, 8, 7]).simulation)
+    rows, (targets, others) = np.array([0, 1, 0]), wandering(2, 3)[:, :, None].astype(float)
+    first, _, _ = simulator.advance(words, rows, targets)
+    second, _, _ = simulator.advance(first, rows, targets)
+    simulator.advance(words, rows, targets)
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(simulator, "_seen", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            simulator.advance(words, rows, others)
+    np.testing.assert_array_equal(simulator.advance(first, rows, targets)[0], second)
+    simulator.close()
+    with pytest.raises(InputError, match="these worlds were closed"):
+        simulator.advance(words, rows, targets)
 
 
 @pytest.mark.full

@@ -22,24 +22,39 @@ from numba.core import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
-from manipose_mj.assets.franka_hand import MAX_OPENING
-from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
-from manipose_mj.mjcf.panda.speed_limits import JOINT_LEADS, TCP_LEAD, TCP_REACH
-from manipose_mj.tasks.core.simulation_state import STATE
-from manipose_mj.tasks.scene.indices import FIRST, RIGHT_PAD
+from manipose_mj.errors import InputError
 
 _LIBRARY = re.compile(r"(lib)?mujoco[.\d]*(\.so[.\d]*|\.dylib|\.dll)")
 _FUNCTIONS = ("mj_step1", "mj_step2", "mj_jacSite", "mj_getState")
-_LOWEST, _HIGHEST = POSITION_LIMITS.T.copy()
-_REACH = np.ascontiguousarray(TCP_REACH)  # or Numba would not keep what it compiles
-_STATE = int(STATE)
-# What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
-_DIVERGED = tuple(
-    int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
-    for name in ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
-)
 # The TCP moves less than its joints sweep, whatever rounding does to either.
-_SURELY_SLOW = (1 - 1e-9) * TCP_LEAD
+_SURELY = 1 - 1e-9
+
+
+class Constants(NamedTuple):
+    """What other modules say. Arguments of the loops, since Numba would keep what they said when it compiled.
+
+    Attributes:
+      lowest, highest: Limits of the arm's set-points [rad].
+      joint_leads: How far they may be ahead of the joints [rad].
+      reach: Of the TCP from each joint's axis, at most [m].
+      tcp_lead: How far ahead of the TCP they may be [m].
+      max_opening: Of the hand [m].
+      state: Which parts of MuJoCo's state are read.
+      warnings: Numbers of those that say that a simulation diverged.
+      right_pad: The last of the robot's kinds of geoms, in `Tables.owners`.
+      first: The first of what is owned there.
+    """
+
+    lowest: np.ndarray
+    highest: np.ndarray
+    joint_leads: np.ndarray
+    reach: np.ndarray
+    tcp_lead: float
+    max_opening: float
+    state: int
+    warnings: np.ndarray
+    right_pad: int
+    first: int
 
 
 class Robots(NamedTuple):
@@ -98,10 +113,17 @@ class Tables(NamedTuple):
 
 
 def _symbols() -> None:
-    """Lets compiled code find MuJoCo's functions by their names, in the library that `mujoco` has loaded."""
+    """Lets compiled code find MuJoCo's functions by their names, in the library that `mujoco` has loaded.
+
+    Raises:
+      InputError: The library is not where it is expected.
+    """
     folder = Path(str(mujoco.__file__)).parent
     libraries = [path for path in folder.iterdir() if _LIBRARY.fullmatch(path.name)]
-    assert len(libraries) == 1, f"{folder}: {len(libraries)} libraries of MuJoCo, expected one"
+    if len(libraries) != 1:
+        raise InputError(
+            f"{folder}: {len(libraries)} libraries of MuJoCo, expected one: install mujoco again"
+        )
     library = ctypes.CDLL(str(libraries[0]))
     for name in _FUNCTIONS:
         address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
@@ -144,11 +166,11 @@ _doubles, _integers = _pointer_to(types.float64), _pointer_to(types.int32)
 
 
 @_compiled
-def step(robots: Robots, targets: Any, first: int, end: int) -> None:
+def step(constants: Constants, robots: Robots, targets: Any, first: int, end: int) -> None:
     """Physics steps of some worlds, one world after the other.
 
     Args:
-      robots: Of all worlds.
+      constants, robots: Of all worlds.
       targets: Joint angles [rad] and openings [m], (worlds, substeps, 8).
       first: World that is stepped; end: Not stepped any more.
     """
@@ -156,34 +178,34 @@ def step(robots: Robots, targets: Any, first: int, end: int) -> None:
     for world in range(first, end):
         model, data = robots.models[world], robots.datas[world]
         for substep in range(targets.shape[1]):
-            follow(robots, world, targets[world, substep], room)
+            follow(constants, robots, world, targets[world, substep], room)
             # The second half of a step, then the first of the next, as the CPU's environment steps.
             _step2(model, data)
             _step1(model, data)
 
 
 @_compiled
-def follow(robots: Robots, world: int, target: Any, allowed: Any) -> None:
+def follow(constants: Constants, robots: Robots, world: int, target: Any, allowed: Any) -> None:
     """Moves a world's set-points as `Servos.follow` does, bit for bit; `allowed` is room for seven numbers."""
     angles = carray(_doubles(robots.angles[world]), 7)
     control = carray(_doubles(robots.controls[world]), 7)
     swept = 0.0
     for j in range(7):
-        most, lead = robots.most[world, j], JOINT_LEADS[j]
+        most, lead = robots.most[world, j], constants.joint_leads[j]
         value = np.minimum(np.maximum(target[j], control[j] - most), control[j] + most)
         value = np.minimum(np.maximum(value, angles[j] - lead), angles[j] + lead)
         allowed[j] = value
-        swept += abs(value - angles[j]) * _REACH[j]
-    if swept >= _SURELY_SLOW:
-        _slow_down(robots, world, angles, allowed)
+        swept += abs(value - angles[j]) * constants.reach[j]
+    if swept >= _SURELY * constants.tcp_lead:
+        _slow_down(constants, robots, world, angles, allowed)
     for j in range(7):
-        control[j] = np.minimum(np.maximum(allowed[j], _LOWEST[j]), _HIGHEST[j])
+        control[j] = np.minimum(np.maximum(allowed[j], constants.lowest[j]), constants.highest[j])
     opening = carray(_doubles(robots.openings[world]), 1)
-    opening[0] = np.minimum(np.maximum(target[7], 0.0), MAX_OPENING)
+    opening[0] = np.minimum(np.maximum(target[7], 0.0), constants.max_opening)
 
 
 @_compiled
-def _slow_down(robots: Robots, world: int, angles: Any, allowed: Any) -> None:
+def _slow_down(constants: Constants, robots: Robots, world: int, angles: Any, allowed: Any) -> None:
     """Draws set-points nearer to the joints where the TCP would move too fast, as `allowed_set_points` does."""
     model, data, address = robots.models[world], robots.datas[world], robots.jacobians[world]
     _site_jacobian(model, data, address, np.uintp(0), robots.sites[world])
@@ -195,25 +217,25 @@ def _slow_down(robots: Robots, world: int, angles: Any, allowed: Any) -> None:
             motion += jacobian[row, first + j] * (allowed[j] - angles[j])
         squares += motion * motion
     length = np.sqrt(squares)
-    if length > TCP_LEAD:
-        share = TCP_LEAD / length
+    if length > constants.tcp_lead:
+        share = constants.tcp_lead / length
         for j in range(7):
             allowed[j] = angles[j] + share * (allowed[j] - angles[j])
 
 
 @_compiled
-def read(tables: Tables, awake: Any, states: Any) -> None:
+def read(constants: Constants, tables: Tables, awake: Any, states: Any) -> None:
     """All states, as `SimulationState.flat` has them; what is longer stays as it is.
 
     Args:
-      tables: Of all worlds.
+      constants, tables: Of all worlds.
       awake: Counts of what is awake, (worlds, 4).
       states: To be written, (worlds, values).
     """
     for world in range(len(states)):
         flat = states[world]
         model, data = tables.robots.models[world], tables.robots.datas[world]
-        _get_state(model, data, flat.ctypes.data, np.int32(_STATE))
+        _get_state(model, data, flat.ctypes.data, np.int32(constants.state))
         place = tables.states[world]
         for k in range(tables.whole.shape[1]):
             count = tables.wholes[world, k]
@@ -233,11 +255,13 @@ def read(tables: Tables, awake: Any, states: Any) -> None:
 
 
 @_compiled
-def measure(tables: Tables, counts: Any, values: Any, touched: Any, diverged: Any) -> None:
+def measure(
+    constants: Constants, tables: Tables, counts: Any, values: Any, touched: Any, diverged: Any
+) -> None:
     """What `measurement.measure` gives, of all worlds, and which of them MuJoCo warns of.
 
     Args:
-      tables: Of all worlds.
+      constants, tables: Of all worlds.
       counts: Of contacts.
       values, touched: Of a `FlatMeasurement`, to be written; nothing is touched yet.
       diverged: To be written.
@@ -250,10 +274,10 @@ def measure(tables: Tables, counts: Any, values: Any, touched: Any, diverged: An
             geoms = carray(_integers(address), 2)
             one, other = tables.owners[world, geoms[0]], tables.owners[world, geoms[1]]
             kind, slot = min(one, other), max(one, other)
-            if kind <= RIGHT_PAD and slot >= FIRST:
-                touched[world, kind, slot - FIRST] = True
+            if kind <= constants.right_pad and slot >= constants.first:
+                touched[world, kind, slot - constants.first] = True
         diverged[world] = False
-        for warning in _DIVERGED:
+        for warning in constants.warnings:
             address = tables.warnings[world] + np.uintp(warning) * tables.warning_bytes[world]
             if carray(_integers(address), 1)[0] > 0:
                 diverged[world] = True

@@ -21,6 +21,7 @@ from unittest import mock
 
 import warp as wp  # pyright: ignore[reportMissingImports]
 
+from manipose_mj.console.process import CORES
 from manipose_mj.storage.cache_file import new_cache_file
 from manipose_mj.storage.source_hash import source_hash
 
@@ -88,9 +89,6 @@ def begin_compiling(
     Returns:
       What to wait for; None where there is too little to do, or one core.
     """
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
     note = _note(likeness, arch)
     if _all_compiled(note, arch):
         return None
@@ -99,12 +97,12 @@ def begin_compiling(
     note.parent.mkdir(parents=True, exist_ok=True)
     with new_cache_file(note) as scratch:
         scratch.write_text(json.dumps([one.name for one in found]), encoding="utf-8")
-    if cores < 2 or len(missing) < _FEWEST:
+    if CORES < 2 or len(missing) < _FEWEST:
         return None
     _log.info("%d of the kernels' modules are compiled", len(missing))
     wp.init()
     task = pickle.dumps((make, arguments, arch, wp.config.kernel_cache_dir))
-    return Compiling(task, min(cores, len(missing)))
+    return Compiling(task, min(CORES, len(missing)))
 
 
 def launches(make: Callable[..., object], arguments: Any) -> list[Launch]:
