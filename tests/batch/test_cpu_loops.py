@@ -6,6 +6,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pytest
 from dm_control import mjcf
 
 from manipose_mj.batch.kernels.cpu_loops import follow
@@ -42,6 +43,24 @@ def test_set_points_move_bit_for_bit():
         slowed += bool(np.linalg.norm(lead) > 0.999 * TCP_LEAD)
         stopped += bool(np.isnan(plain.control).any())
     assert 20 < slowed < ROBOTS - 20 and stopped == ROBOTS // 50
+
+
+@pytest.mark.parametrize(
+    "changed", [{"tcp_lead": 0.001}, {"max_opening": 0.01}, {"lowest": np.zeros(7)}]
+)
+def test_limits_are_those_of_the_call(changed):
+    """Not those that were true when Numba compiled the loop, perhaps weeks ago."""
+    panda = Panda()
+    physics = mjcf.Physics.from_mjcf_model(panda.mjcf_model)
+    model, at = physics.model.ptr, panda.servos(physics).at
+    robots, target, found = empty_robots(1), np.append(HOME + 0.5, 0.08), []
+    for limits in (constants(), constants()._replace(**changed)):
+        servos = servos_at(model, at, HOME, HOME.copy())
+        enter_robot(robots, 0, servos)
+        for _ in range(20):
+            follow(limits, robots, 0, target, np.empty(7))
+        found.append(np.append(servos.control, servos.opening))
+    assert not np.array_equal(*found)
 
 
 def servos_at(model: mujoco.MjModel, at: Any, joints: np.ndarray, controls: np.ndarray) -> Servos:
