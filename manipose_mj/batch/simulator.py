@@ -41,7 +41,6 @@ class Simulator:
         self._lock, self._closed = threading.Lock(), False
         self._models, self._tables = RowModels(pool), empty_tables(pool, worlds)
         self._servos: list[Servos | None] = [None] * worlds
-        self._datas: list[mujoco.MjData | None] = [None] * worlds
         self._rows = np.full(worlds, -1)
         self._words = np.zeros((worlds, state_words(pool)), np.uint32)  # as last returned
         one = pool.starts[0].measurement
@@ -99,7 +98,6 @@ class Simulator:
                 self._threads.shutdown()
             self._rows[:] = -1
             self._servos[:] = [None] * len(self._rows)
-            self._datas[:] = [None] * len(self._rows)
 
     def _step(self, targets: Float[np.ndarray, "worlds substeps 8"]) -> None:
         robots = self._tables.robots
@@ -124,7 +122,6 @@ class Simulator:
         start = self._pool.starts[row]
         servos = Servos.of(model, mujoco.MjData(model), start.addresses.servos)
         self._servos[number] = servos
-        self._datas[number] = servos.data
         enter(self._tables, number, start, servos)
         self._rows[number] = row
         self._words[number] = 0
@@ -138,7 +135,7 @@ class Simulator:
         self, rows: Int[np.ndarray, " worlds"]
     ) -> tuple[UInt32[np.ndarray, "worlds words"], Bool[np.ndarray, " worlds"], FlatMeasurement]:
         """States after a step, who diverged, and measurements."""
-        tables, datas = self._tables, self._datas
+        tables, datas = self._tables, [self._at(i).data for i in range(len(rows))]
         states = np.zeros_like(self._words)
         counts = np.array(list(map(_COUNTS, datas)))
         contacts = counts[:, 0]

@@ -239,18 +239,13 @@ def read(constants: Constants, tables: Tables, awake: Any, states: Any) -> None:
         place = tables.states[world]
         for k in range(tables.whole.shape[1]):
             count = tables.wholes[world, k]
-            integers = carray(_integers(tables.whole[world, k]), count)
-            for i in range(count):
-                flat[place + i] = integers[i]
+            flat[place : place + count] = carray(_integers(tables.whole[world, k]), count)
             place += count
-        for k in range(awake.shape[1]):
-            flat[place + k] = awake[world, k]
+        flat[place : place + awake.shape[1]] = awake[world]
         place += awake.shape[1]
         for k in range(tables.real.shape[1]):
             count = tables.reals[world, k]
-            doubles = carray(_doubles(tables.real[world, k]), count)
-            for i in range(count):
-                flat[place + i] = doubles[i]
+            flat[place : place + count] = carray(_doubles(tables.real[world, k]), count)
             place += count
 
 
