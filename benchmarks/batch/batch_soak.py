@@ -25,9 +25,12 @@ from jaxtyping import Int
 
 from manipose_mj import batch
 from manipose_mj.batch.capacity import Capacity
+from manipose_mj.batch.drawing import draw_pool
+from manipose_mj.batch.starts import StartPool
 from manipose_mj.console.process import compile_at_once_on_gpus
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.poses import Array
+from manipose_mj.tasks.core.config import EnvConfig
 
 STEPS = 50  # control steps between looks at the clock
 HELD = 25  # control steps for which a random action is held
@@ -60,6 +63,7 @@ def main() -> None:
     parser.add_argument("--engine", default="warp", choices=("warp", "c"))
     parser.add_argument("--objects", nargs="+", help="names of objects, instead of all")
     parser.add_argument("--starts", type=int, default=32, help="drawn before")
+    parser.add_argument("--pool", type=Path, help="drawn starts of the task, instead of new ones")
     parser.add_argument("--row", type=float, default=60.0, help="seconds of a row")
     parser.add_argument(
         "--room",
@@ -71,15 +75,9 @@ def main() -> None:
     arguments = parser.parse_args()
     compile_at_once_on_gpus()
     room = arguments.room
-    worlds = batch.make(
-        arguments.task,
-        worlds=arguments.worlds,
-        seeds=range(min(arguments.starts, arguments.worlds)),
-        engine=arguments.engine,
-        capacity=None if room is None else Capacity(room[0], int(room[1])),
-        objects=arguments.objects,
-        reward_mode="dense",
-    )
+    pool = StartPool.load(arguments.pool) if arguments.pool else _drawn(arguments)
+    capacity = None if room is None else Capacity(room[0], int(room[1]))
+    worlds = batch.from_pool(pool, arguments.worlds, arguments.engine, capacity=capacity)
     print(f"{machine()}; {jax.devices()[0].device_kind}; MuJoCo {mujoco.__version__}")
     print(f"{arguments.task}, engine {arguments.engine}, {arguments.worlds:,} worlds")
     print("| " + " | ".join(COLUMNS) + " |")
@@ -89,6 +87,11 @@ def main() -> None:
     complaints = verdict(rows)
     print("changed: " + "; ".join(complaints) if complaints else "nothing changed")
     raise SystemExit(bool(complaints))
+
+
+def _drawn(arguments: argparse.Namespace) -> StartPool:
+    config = EnvConfig(arguments.task, objects=arguments.objects, reward_mode="dense")
+    return draw_pool(config, range(min(arguments.starts, arguments.worlds)))
 
 
 def soak(worlds: batch.Worlds, seconds: float, row: float) -> list[Minute]:

@@ -15,13 +15,19 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
-from manipose_mj.batch.kernels.cpu_loops import measure, read, step
+from manipose_mj.batch.kernels.cpu_loops import (
+    begin_putting_back,
+    end_putting_back,
+    measure,
+    read,
+    step,
+)
 from manipose_mj.batch.measurement import FlatMeasurement, flat_values
 from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.batch.world_tables import constants, empty_tables, enter, enter_contacts
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.servos import Servos
-from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS, unflatten, write_simulation
+from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS
 
 _COUNTS = attrgetter("ncon", *AWAKE_COUNTS)
 
@@ -73,12 +79,10 @@ class Simulator:
                 raise InputError("these worlds were closed")
             for i in np.flatnonzero(self._rows != rows).tolist():
                 self._begin(i, int(rows[i]))
-            others = np.flatnonzero((self._words != words).any(axis=1)).tolist()
+            others = np.flatnonzero((self._words != words).any(axis=1))
             self._rows[:] = -1  # if the rest is interrupted, all worlds begin anew
-            for i in others:
-                model, data = self.held(i)
-                state = unflatten(model, data, words[i].copy().view(float))
-                write_simulation(model, data, state)
+            if len(others):
+                self._put_back(others, np.ascontiguousarray(words).view(float))
             self._step(targets)
             states, diverged, measured = self._seen(rows)
             self._words[:] = states
@@ -114,6 +118,18 @@ class Simulator:
             wait(running)  # for what goes on after an interruption, and has the data
         for each in running:
             each.result()
+
+    def _put_back(self, worlds: Int[np.ndarray, " n"], states: Float[np.ndarray, "m k"]) -> None:
+        """What `write_simulation` does, in some of the worlds; only Python knows where the counts are."""
+        tables, size = self._tables, len(AWAKE_COUNTS)
+        begin_putting_back(self._constants, tables, worlds, states)
+        firsts = tables.states[worlds] + tables.wholes[worlds].sum(axis=1)
+        counts = states[worlds[:, None], firsts[:, None] + np.arange(size)].astype(int).tolist()
+        for world, values in zip(worlds.tolist(), counts, strict=True):
+            data = self._at(world).data
+            for name, count in zip(AWAKE_COUNTS, values, strict=True):
+                setattr(data, name, count)
+        end_putting_back(self._constants, tables, worlds, states, size)
 
     def _begin(self, number: int, row: int) -> None:
         """Give a world new data, of another start."""

@@ -25,7 +25,9 @@ from numba.np.numpy_support import carray
 from manipose_mj.errors import InputError
 
 _LIBRARY = re.compile(r"(lib)?mujoco[.\d]*(\.so[.\d]*|\.dylib|\.dll)")
-_FUNCTIONS = ("mj_step1", "mj_step2", "mj_jacSite", "mj_getState")
+_FUNCTIONS = (
+    "mj_step1", "mj_step2", "mj_jacSite", "mj_getState", "mj_setState", "mj_resetData", "mj_forward",
+)  # fmt: skip
 # The TCP moves less than its joints sweep, whatever rounding does to either.
 _SURELY = 1 - 1e-9
 
@@ -150,6 +152,12 @@ _get_state = types.ExternalFunction(
     "mj_getState", types.void(_POINTER, _POINTER, _POINTER, types.int32)
 )
 
+_set_state = types.ExternalFunction(
+    "mj_setState", types.void(_POINTER, _POINTER, _POINTER, types.int32)
+)
+_reset_data = types.ExternalFunction("mj_resetData", types.void(_POINTER, _POINTER))
+_forward = types.ExternalFunction("mj_forward", types.void(_POINTER, _POINTER))
+
 
 def _pointer_to(kind: Any) -> Any:
     @intrinsic
@@ -221,6 +229,46 @@ def _slow_down(constants: Constants, robots: Robots, world: int, angles: Any, al
         share = constants.tcp_lead / length
         for j in range(7):
             allowed[j] = angles[j] + share * (allowed[j] - angles[j])
+
+
+@_compiled
+def begin_putting_back(constants: Constants, tables: Tables, chosen: Any, states: Any) -> None:
+    """The first half of `write_simulation`: all before the counts of what is awake.
+
+    Args:
+      constants, tables: Of all worlds.
+      chosen: Numbers of the worlds.
+      states: Of all worlds, as `read` gives them.
+    """
+    for world in chosen:
+        flat = states[world]
+        model, data = tables.robots.models[world], tables.robots.datas[world]
+        _reset_data(model, data)
+        _set_state(model, data, flat.ctypes.data, np.int32(constants.state))
+        _forward(model, data)
+        place = tables.states[world]
+        for k in range(tables.whole.shape[1]):
+            values = carray(_integers(tables.whole[world, k]), tables.wholes[world, k])
+            for i in range(len(values)):
+                values[i] = np.int32(flat[place + i])
+            place += len(values)
+
+
+@_compiled
+def end_putting_back(
+    constants: Constants, tables: Tables, chosen: Any, states: Any, awake: int
+) -> None:
+    """The second half of `write_simulation`: all after the counts, of which there are `awake`."""
+    for world in chosen:
+        flat = states[world]
+        model, data = tables.robots.models[world], tables.robots.datas[world]
+        _set_state(model, data, flat.ctypes.data, np.int32(constants.state))
+        _step1(model, data)
+        place = tables.states[world] + tables.wholes[world].sum() + awake
+        for k in range(tables.real.shape[1]):
+            values = carray(_doubles(tables.real[world, k]), tables.reals[world, k])
+            values[:] = flat[place : place + len(values)]
+            place += len(values)
 
 
 @_compiled
