@@ -9,12 +9,21 @@ from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
 from manipose_mj import batch
 from manipose_mj.batch.simulator import Simulator
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.simulation_state import (
+    ASLEEP,
+    AWAKE_COUNTS,
+    LEFT_BEHIND,
+    read_simulation,
+    unflatten,
+    write_simulation,
+)
 from tests.batch.batched import make, wandering
 
 TASK = "articulated/open_middle_drawer"
@@ -224,6 +233,27 @@ def test_callers_in_several_threads_wait_for_one_another(worlds, threads):
         found = list(callers.map(lambda action: made.step(state, action).simulation, actions))
     equal(found, expected)
     made.close()
+
+
+def test_states_are_put_back_as_the_tasks_put_them_back(worlds):
+    """Also what no later step shows: who is asleep, and what the last step left behind."""
+    simulator, rows = Simulator(worlds.pool, 3), np.array([0, 1, 0])
+    before = np.asarray(worlds.at([7, 8, 7]).simulation)
+    targets = wandering(4, 3)[:, :, None].astype(float)
+    for target in targets[:3]:
+        words, _, _ = simulator.advance(before, rows, target)
+        simulator._put_back(np.array([0, 2]), before.view(float))
+        simulator._put_back(np.array([1]), before.view(float))
+        for world in range(3):
+            model, data = simulator.held(world)
+            expected = mujoco.MjData(model)
+            saved = unflatten(model, expected, before[world].copy().view(float))
+            write_simulation(model, expected, saved)
+            for name in (*LEFT_BEHIND, *ASLEEP, *AWAKE_COUNTS, "qpos", "qvel", "xpos", "ncon"):
+                np.testing.assert_array_equal(getattr(data, name), getattr(expected, name))
+            np.testing.assert_array_equal(read_simulation(model, data).flat(), saved.flat())
+        before = words
+    simulator.close()
 
 
 @pytest.mark.parametrize("threads", [1, 2])
