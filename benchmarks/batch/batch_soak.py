@@ -79,7 +79,7 @@ def main() -> None:
     capacity = None if room is None else Capacity(room[0], int(room[1]))
     worlds = batch.from_pool(pool, arguments.worlds, arguments.engine, capacity=capacity)
     print(f"{machine()}; {jax.devices()[0].device_kind}; MuJoCo {mujoco.__version__}")
-    print(f"{arguments.task}, engine {arguments.engine}, {arguments.worlds:,} worlds")
+    print(f"{pool.layout.task}, engine {arguments.engine}, {arguments.worlds:,} worlds")
     print("| " + " | ".join(COLUMNS) + " |")
     print("|" + " ---: |" * len(COLUMNS), flush=True)
     rows = soak(worlds, 60 * arguments.minutes, arguments.row)

@@ -151,7 +151,6 @@ _site_jacobian = types.ExternalFunction(
 _get_state = types.ExternalFunction(
     "mj_getState", types.void(_POINTER, _POINTER, _POINTER, types.int32)
 )
-
 _set_state = types.ExternalFunction(
     "mj_setState", types.void(_POINTER, _POINTER, _POINTER, types.int32)
 )
