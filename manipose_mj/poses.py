@@ -49,6 +49,14 @@ def invert(pose: Float[Array, "*b 4 4"]) -> Float[Array, "*b 4 4"]:
     return compose(rotation, -(rotation @ pose[..., :3, 3:])[..., 0])
 
 
+def chain(first: Float[Array, "*#b 4 4"], then: Float[Array, "*#b 4 4"]) -> Array:
+    """The pose `T_ac` of `T_ab` and `T_bc`."""
+    if namespace(first) is np:
+        return first @ then
+    # XLA's product of many small matrices takes ten times as long on the CPU.
+    return sum(first[..., :, i, None] * then[..., None, i, :] for i in range(4))
+
+
 def transform(pose: Float[Array, "*#b 4 4"], points: Float[Array, "*#b n 3"]) -> Array:
     """Points given in frame b, mapped by `T_ab` into frame a."""
     xp = namespace(pose)
@@ -141,9 +149,7 @@ def rotation_angle(a: Float[Array, "*#b 3 3"], b: Float[Array, "*#b 3 3"]) -> Fl
 
     Uses `|a - b|_F = 2 sqrt(2) sin(angle / 2)`; the trace formula loses half the digits near 0.
     """
-    xp = namespace(a)
-    chord = xp.sqrt(xp.sum((a - b) ** 2, axis=(-2, -1)) / 8)
-    return 2 * xp.asin(xp.clip(chord, 0.0, 1.0))
+    return _angle_of(_squared_chord(a - b))
 
 
 @dataclass(frozen=True)
@@ -247,13 +253,40 @@ def pose_error(
     translation = xp.sqrt(xp.sum((estimate[..., :3, 3] - truth[..., :3, 3]) ** 2, axis=-1))
     rotations = xp.asarray(symmetry.rotations, dtype=truth.dtype)
     equivalents = truth[..., None, :3, :3] @ rotations
-    own = estimate[..., None, :3, :3]
-    if symmetry.axial is False:
-        angles = rotation_angle(own, equivalents)
+    apart = estimate[..., None, :3, :3] - equivalents
+    if symmetry.axial is True:
+        squares = _squared_axis_chord(apart)
     else:
-        chord = xp.sqrt(xp.sum((own[..., 0] - equivalents[..., 0]) ** 2, axis=-1)) / 2
-        angles = 2 * xp.asin(xp.clip(chord, 0.0, 1.0))
-        if symmetry.axial is not True:  # differs between worlds, or is not known before it runs
+        squares = _squared_chord(apart)
+        if symmetry.axial is not False:  # differs between worlds, or is not known before it runs
             axial = xp.asarray(symmetry.axial)[..., None]
-            angles = xp.where(axial, angles, rotation_angle(own, equivalents))
-    return translation, xp.min(angles, axis=-1)
+            squares = xp.where(axial, _squared_axis_chord(apart), squares)
+    # The angle grows with the chord, so one arc sine does for the whole group.
+    return translation, _angle_of(xp.min(squares, axis=-1))
+
+
+def _squared_chord(apart: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
+    """Of the angle between two rotations, by their difference, on a circle of diameter 1."""
+    return _sum_of_squares(apart, 2) / 8
+
+
+def _squared_axis_chord(apart: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
+    """Of the angle between the X axes of two rotations, on the same circle."""
+    return _sum_of_squares(apart[..., 0], 1) / 4
+
+
+def _angle_of(squared_chord: Float[Array, "*b"]) -> Float[Array, "*b"]:
+    xp = namespace(squared_chord)
+    return 2 * xp.asin(xp.clip(xp.sqrt(squared_chord), 0.0, 1.0))
+
+
+def _sum_of_squares(values: Array, axes: int) -> Array:
+    """Over the last axes."""
+    xp = namespace(values)
+    if xp is np:
+        return np.sum(values**2, axis=tuple(range(-axes, 0)))
+    # XLA adds a few terms on the CPU ten times as fast as it reduces so short an axis.
+    squares = values**2
+    for _ in range(axes):
+        squares = sum(squares[..., i] for i in range(squares.shape[-1]))
+    return squares

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from manipose_mj.batch.measurement import FlatMeasurement
 from manipose_mj.batch.starts import RowModels, StartPool, awake
 from manipose_mj.console.process import CORES
 from manipose_mj.errors import InputError
@@ -85,24 +86,25 @@ def probe(pool: StartPool) -> Peaks:
     Args:
       pool: Of starts; those that are played have from the fewest to the most contacts when they begin.
     """
-    from manipose_mj.batch.simulator import Simulator, packed, state_words  # Numba is slow to load
+    from manipose_mj.batch.simulator import Simulator, packed, state_size  # Numba is slow to load
 
     pool = replace(pool, scenes=tuple(awake(scene) for scene in pool.scenes))
     counter = _Counter(pool)
     rows = counter.spread(min(PROBED, len(pool.starts)))
     starts = [pool.starts[row] for row in rows]
-    simulator, size = Simulator(pool, len(rows), threads=CORES), state_words(pool)
+    simulator, size = Simulator(pool, len(rows), threads=CORES), state_size(pool)
     first = np.stack([packed(start.simulation, size) for start in starts])
-    words, rng = first.copy(), np.random.default_rng(pool.seeds)
+    states, seen, rng = first.copy(), simulator.room(), np.random.default_rng(pool.seeds)
     down = [start.measurement.tcp_rotation for start in starts]
     targets = np.stack([np.append(s.measurement.joints, MAX_OPENING) for s in starts])
     peaks = np.stack([counter.begun[row] for row in rows])
     for step in range(sum(_PHASES) + _DRAWN_TARGETS * _HELD):
         held = np.repeat(targets[:, None], pool.layout.substeps, axis=1)
-        words, diverged, measured = simulator.advance(words, rows, held)
+        simulator.advance(states, np.asarray(rows), held, seen)
+        measured = FlatMeasurement(seen.values, seen.contacts)
         now = measured.split(starts[0].measurement)
-        words[diverged] = first[diverged]
-        for world in np.flatnonzero(~diverged).tolist():
+        states = np.where(seen.diverged[:, None], first, seen.states)
+        for world in np.flatnonzero(~seen.diverged).tolist():
             model, data = simulator.held(world)
             peaks[world] = np.maximum(peaks[world], counter.count(rows[world], model, data))
             if step < sum(_PHASES):

@@ -104,7 +104,7 @@ class Controller:
                 targets, memory = self._law.targets(memory, self._timestep)
                 return _single(memory), jnp.append(targets, memory.opening).astype(jnp.float32)
 
-            return jax.lax.scan(send, memory, length=self._substeps)
+            return jax.lax.scan(send, memory, length=self._substeps, unroll=True)
 
         memory, targets = jax.vmap(one)(commands.memory)
         if not self._longest:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -11,16 +10,15 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt32
 
+from manipose_mj.batch.kernels.cpu_loops import Seen
+from manipose_mj.batch.kernels.direct_call import DirectCall
 from manipose_mj.batch.measurement import FlatMeasurement, Measurement, flat_values
-from manipose_mj.batch.simulator import Simulator, packed, state_words
+from manipose_mj.batch.simulator import Simulator, packed, state_size
 from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from manipose_mj.poses import Array
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
-
-Words = UInt32[np.ndarray, "worlds words"]
-Advanced = tuple[Words, Bool[np.ndarray, " worlds"], FlatMeasurement]
 
 
 class CEngine:
@@ -40,18 +38,22 @@ class CEngine:
         self._simulator = Simulator(pool, worlds, threads=threads)
         self._one = pool.starts[0].measurement
         shapes = jax.ShapeDtypeStruct
-        self._shapes = (
-            shapes((worlds, state_words(pool)), jnp.uint32),
-            shapes((worlds,), jnp.bool_),
-            FlatMeasurement(
+        self._call = DirectCall(
+            self._advance,
+            (
+                shapes((worlds, 2 * state_size(pool)), jnp.uint32),
+                shapes((worlds,), jnp.bool_),
                 shapes((worlds, len(flat_values(self._one))), jnp.float32),
                 shapes((worlds, *self._one.contacts.shape), jnp.bool_),
             ),
         )
 
     def starts(self) -> UInt32[Array, "starts words"]:
-        words = state_words(self._pool)
-        return jnp.asarray(np.stack([packed(s.simulation, words) for s in self._pool.starts]))
+        size = state_size(self._pool)
+        states = np.stack([packed(start.simulation, size) for start in self._pool.starts])
+        return jnp.asarray(
+            states.view(np.uint32)
+        )  # double precision as words, which JAX leaves as they are
 
     def advance(
         self,
@@ -59,14 +61,8 @@ class CEngine:
         rows: Int[Array, " worlds"],
         targets: Float[Array, "worlds substeps 8"],
     ) -> tuple[UInt32[Array, "worlds words"], Bool[Array, " worlds"], Measurement]:
-        # One array, since each costs JAX as much as the step of a world takes.
-        parts = (physics, rows.astype(jnp.int32), targets)
-        words = [jax.lax.bitcast_convert_type(part, jnp.uint32) for part in parts]
-        given = jnp.concatenate([part.reshape(len(rows), -1) for part in words], axis=1)
-        after, diverged, measured = jax.pure_callback(
-            partial(self._advance, targets.dtype), self._shapes, given
-        )
-        return after, diverged, measured.split(self._one)
+        after, diverged, values, contacts = self._call(physics, rows.astype(jnp.int32), targets)
+        return after, diverged, FlatMeasurement(values, contacts).split(self._one)
 
     def overflowed(self, physics: UInt32[Array, "worlds words"]) -> Bool[Array, " worlds"]:
         return jnp.zeros(len(physics), bool)
@@ -109,12 +105,13 @@ class CEngine:
     def close(self) -> None:
         self._simulator.close()
 
-    def _advance(self, real: np.dtype, given: Array) -> Advanced:
-        words = np.asarray(given)
-        size = self._shapes[0].shape[1]
-        rows, targets = words[:, size].view(np.int32), words[:, size + 1 :].view(real)
-        after, diverged, measured = self._simulator.advance(
-            words[:, :size], rows, targets.reshape(len(words), -1, 8).astype(float)
-        )
-        # In the precision that JAX has.
-        return after, diverged, measured._replace(values=measured.values.astype(np.float32))
+    def _advance(
+        self,
+        words: UInt32[np.ndarray, "worlds words"],
+        rows: Int[np.ndarray, " worlds"],
+        targets: Float[np.ndarray, "worlds substeps 8"],
+        *written: np.ndarray,
+    ) -> None:
+        after, diverged, values, contacts = written
+        seen = Seen(after.view(float), values, contacts, diverged)
+        self._simulator.advance(words.view(float), rows, targets, seen)

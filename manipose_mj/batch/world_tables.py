@@ -9,6 +9,7 @@ import numpy as np
 
 from manipose_mj.assets.franka_hand import MAX_OPENING
 from manipose_mj.batch.kernels.cpu_loops import Constants, Robots, Tables
+from manipose_mj.batch.kernels.data_fields import data_fields
 from manipose_mj.batch.measurement import flat_values, gathered
 from manipose_mj.batch.starts import Start, StartPool
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
@@ -46,6 +47,7 @@ def constants() -> Constants:
         warnings=np.array([int(getattr(mujoco.mjtWarning, f"mjWARN_{n}")) for n in _DIVERGED]),
         right_pad=RIGHT_PAD,
         first=FIRST,
+        fields=data_fields(),
     )
 
 
@@ -68,10 +70,6 @@ def empty_tables(pool: StartPool, worlds: int) -> Tables:
         real=addresses(len(LEFT_BEHIND)),
         wholes=numbers(len(ASLEEP)),
         reals=numbers(len(LEFT_BEHIND)),
-        contacts=addresses(),
-        contact_bytes=addresses(),
-        warnings=addresses(),
-        warning_bytes=addresses(),
         owners=np.full((worlds, geoms), NOBODY),
     )
 
@@ -128,16 +126,6 @@ def enter(tables: Tables, world: int, start: Start, servos: Servos) -> None:
     tables.real[world] = [array.ctypes.data for array in real]
     tables.wholes[world] = [array.size for array in whole]
     tables.reals[world] = [array.size for array in real]
-    tables.contacts[world] = 0
-    warnings = data.warning.number
-    tables.warnings[world], tables.warning_bytes[world] = warnings.ctypes.data, warnings.strides[0]
     owners = start.addresses.owners
     tables.owners[world] = NOBODY
     tables.owners[world, : len(owners)] = owners
-
-
-def enter_contacts(tables: Tables, world: int, data: mujoco.MjData) -> None:
-    """Writes where a world's contacts are: at the beginning of MuJoCo's arena, once there was one."""
-    geoms = data.contact.geom
-    tables.contacts[world] = geoms.ctypes.data
-    tables.contact_bytes[world] = geoms.strides[0]

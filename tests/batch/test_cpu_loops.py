@@ -1,7 +1,8 @@
-"""Compiled loops move set-points as the servos of a single robot do."""
+"""Compiled loops move set-points as the servos of a single robot do, and find what MuJoCo's data have."""
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import mujoco
@@ -10,6 +11,7 @@ import pytest
 from dm_control import mjcf
 
 from manipose_mj.batch.kernels.cpu_loops import follow
+from manipose_mj.batch.kernels.data_fields import data_fields
 from manipose_mj.batch.world_tables import constants, empty_robots, enter_robot
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, Panda
@@ -69,3 +71,26 @@ def servos_at(model: mujoco.MjModel, at: Any, joints: np.ndarray, controls: np.n
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     return Servos.of(model, data, at)
+
+
+def test_fields_are_where_mujoco_shows_them():
+    """Contacts of a falling box, a warning, and what is awake."""
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .09'><freejoint/>"
+        "<geom name='box' type='box' size='.1 .1 .1'/></body></worldbody></mujoco>"
+    )
+    data, fields = mujoco.MjData(model), data_fields()
+    mujoco.mj_forward(model, data)
+    data.warning[3].number = 5
+
+    def number(kind: Any, offset: int) -> int:
+        return kind.from_address(data._address + offset).value
+
+    assert number(ctypes.c_int32, fields.contact_count) == data.ncon == 4
+    first = number(ctypes.c_uint64, fields.contacts)
+    geoms = data.contact.geom
+    assert first + fields.contact_geoms == geoms.ctypes.data
+    assert fields.contact_bytes == geoms.strides[0]
+    assert number(ctypes.c_int32, fields.warnings + 3 * fields.warning_bytes) == 5
+    awake = [data.ntree_awake, data.nbody_awake, data.nparent_awake, data.nv_awake]
+    assert [number(ctypes.c_int32, int(at)) for at in fields.awake] == awake

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from manipose_mj import batch
+from manipose_mj.batch.kernels.cpu_loops import put_back
 from manipose_mj.batch.simulator import Simulator
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.simulation_state import (
@@ -238,44 +239,52 @@ def test_callers_in_several_threads_wait_for_one_another(worlds, threads):
 def test_states_are_put_back_as_the_tasks_put_them_back(worlds):
     """Also what no later step shows: who is asleep, and what the last step left behind."""
     simulator, rows = Simulator(worlds.pool, 3), np.array([0, 1, 0])
-    before = np.asarray(worlds.at([7, 8, 7]).simulation)
+    before = np.asarray(worlds.at([7, 8, 7]).simulation).view(float)
     targets = wandering(4, 3)[:, :, None].astype(float)
     for target in targets[:3]:
-        words, _, _ = simulator.advance(before, rows, target)
-        simulator._put_back(np.array([0, 2]), before.view(float))
-        simulator._put_back(np.array([1]), before.view(float))
+        seen = simulator.room()
+        simulator.advance(before, rows, target, seen)
         for world in range(3):
+            put_back(simulator._constants, simulator._tables, world, before)
             model, data = simulator.held(world)
             expected = mujoco.MjData(model)
-            saved = unflatten(model, expected, before[world].copy().view(float))
+            saved = unflatten(model, expected, before[world])
             write_simulation(model, expected, saved)
             for name in (*LEFT_BEHIND, *ASLEEP, *AWAKE_COUNTS, "qpos", "qvel", "xpos", "ncon"):
                 np.testing.assert_array_equal(getattr(data, name), getattr(expected, name))
             np.testing.assert_array_equal(read_simulation(model, data).flat(), saved.flat())
-        before = words
+        before = seen.states
     simulator.close()
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_after_an_interruption_states_are_still_what_they_were(worlds, threads, monkeypatch):
     simulator = Simulator(worlds.pool, 3, threads=threads)
-    words = np.asarray(worlds.at([7, 8, 7]).simulation)
+    states = np.asarray(worlds.at([7, 8, 7]).simulation).view(float)
     rows, (targets, others) = np.array([0, 1, 0]), wandering(2, 3)[:, :, None].astype(float)
-    first, _, _ = simulator.advance(words, rows, targets)
-    second, _, _ = simulator.advance(first, rows, targets)
-    simulator.advance(words, rows, targets)
 
-    def interrupt(_):
+    def after(states: np.ndarray, targets: np.ndarray) -> np.ndarray:
+        seen = simulator.room()
+        simulator.advance(states, rows, targets, seen)
+        return seen.states
+
+    first = after(states, targets)
+    second = after(first, targets)
+    after(states, targets)
+    step = simulator._step
+
+    def interrupt(*given: Any) -> None:
+        step(*given)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(simulator, "_seen", interrupt)
+        patch.setattr(simulator, "_step", interrupt)
         with pytest.raises(KeyboardInterrupt):
-            simulator.advance(words, rows, others)
-    np.testing.assert_array_equal(simulator.advance(first, rows, targets)[0], second)
+            after(states, others)
+    np.testing.assert_array_equal(after(first, targets), second)
     simulator.close()
     with pytest.raises(InputError, match="these worlds were closed"):
-        simulator.advance(words, rows, targets)
+        after(states, targets)
 
 
 @pytest.mark.full

@@ -22,6 +22,7 @@ from numba.core import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
+from manipose_mj.batch.kernels.data_fields import DataFields
 from manipose_mj.errors import InputError
 
 _LIBRARY = re.compile(r"(lib)?mujoco[.\d]*(\.so[.\d]*|\.dylib|\.dll)")
@@ -45,6 +46,7 @@ class Constants(NamedTuple):
       warnings: Numbers of those that say that a simulation diverged.
       right_pad: The last of the robot's kinds of geoms, in `Tables.owners`.
       first: The first of what is owned there.
+      fields: Where MuJoCo keeps its counts, contacts and warnings.
     """
 
     lowest: np.ndarray
@@ -57,6 +59,7 @@ class Constants(NamedTuple):
     warnings: np.ndarray
     right_pad: int
     first: int
+    fields: DataFields
 
 
 class Robots(NamedTuple):
@@ -93,10 +96,6 @@ class Tables(NamedTuple):
       states: Numbers of values that MuJoCo's state has.
       whole, real: Addresses of what else belongs to a world's state: integers, then doubles.
       wholes, reals: How many are at each.
-      contacts: Address of the first contact's geoms; 0 until there was one.
-      contact_bytes: From one contact to the next.
-      warnings: Address of the first counter of warnings.
-      warning_bytes: From one to the next.
       owners: Of each geom, as in `Addresses`.
     """
 
@@ -107,11 +106,22 @@ class Tables(NamedTuple):
     real: np.ndarray
     wholes: np.ndarray
     reals: np.ndarray
-    contacts: np.ndarray
-    contact_bytes: np.ndarray
-    warnings: np.ndarray
-    warning_bytes: np.ndarray
     owners: np.ndarray
+
+
+class Seen(NamedTuple):
+    """Worlds after a control step.
+
+    Attributes:
+      states: Of MuJoCo, as `SimulationState.flat` has them, then zeros.
+      values, contacts: Of a `FlatMeasurement`.
+      diverged: Whether MuJoCo warned of it.
+    """
+
+    states: np.ndarray
+    values: np.ndarray
+    contacts: np.ndarray
+    diverged: np.ndarray
 
 
 def _symbols() -> None:
@@ -170,25 +180,18 @@ def _pointer_to(kind: Any) -> Any:
 
 
 _doubles, _integers = _pointer_to(types.float64), _pointer_to(types.int32)
+_words, _addresses = _pointer_to(types.uint64), _pointer_to(types.uintp)
 
 
-@_compiled
-def step(constants: Constants, robots: Robots, targets: Any, first: int, end: int) -> None:
-    """Physics steps of some worlds, one world after the other.
+@intrinsic
+def _take(_: Any, address: Any) -> Any:
+    """Counts up by one what is at an address, for all threads at once; returns what it was."""
 
-    Args:
-      constants, robots: Of all worlds.
-      targets: Joint angles [rad] and openings [m], (worlds, substeps, 8).
-      first: World that is stepped; end: Not stepped any more.
-    """
-    room = np.empty(7)
-    for world in range(first, end):
-        model, data = robots.models[world], robots.datas[world]
-        for substep in range(targets.shape[1]):
-            follow(constants, robots, world, targets[world, substep], room)
-            # The second half of a step, then the first of the next, as the CPU's environment steps.
-            _step2(model, data)
-            _step1(model, data)
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
+        counter = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+        return builder.atomic_rmw("add", counter, ir.Constant(ir.IntType(64), 1), "monotonic")
+
+    return types.int64(types.uintp), generate
 
 
 @_compiled
@@ -231,95 +234,123 @@ def _slow_down(constants: Constants, robots: Robots, world: int, angles: Any, al
 
 
 @_compiled
-def begin_putting_back(constants: Constants, tables: Tables, chosen: Any, states: Any) -> None:
-    """The first half of `write_simulation`: all before the counts of what is awake.
-
-    Args:
-      constants, tables: Of all worlds.
-      chosen: Numbers of the worlds.
-      states: Of all worlds, as `read` gives them.
-    """
-    for world in chosen:
-        flat = states[world]
-        model, data = tables.robots.models[world], tables.robots.datas[world]
-        _reset_data(model, data)
-        _set_state(model, data, flat.ctypes.data, np.int32(constants.state))
-        _forward(model, data)
-        place = tables.states[world]
-        for k in range(tables.whole.shape[1]):
-            values = carray(_integers(tables.whole[world, k]), tables.wholes[world, k])
-            for i in range(len(values)):
-                values[i] = np.int32(flat[place + i])
-            place += len(values)
+def put_back(constants: Constants, tables: Tables, world: int, states: Any) -> None:
+    """What `write_simulation` does, in a world; states: Of all worlds, as `SimulationState.flat` has them."""
+    model, data = tables.robots.models[world], tables.robots.datas[world]
+    row = states.ctypes.data + np.uintp(world * states.strides[0])
+    flat = carray(_doubles(row), states.shape[1])
+    _reset_data(model, data)
+    _set_state(model, data, row, np.int32(constants.state))
+    # Who sleeps is no part of MuJoCo's state: bodies that do are not moved, so all are put in place first.
+    _forward(model, data)
+    place = tables.states[world]
+    for k in range(tables.whole.shape[1]):
+        values = carray(_integers(tables.whole[world, k]), tables.wholes[world, k])
+        for i in range(len(values)):
+            values[i] = np.int32(flat[place + i])
+        place += len(values)
+    for offset in constants.fields.awake:
+        carray(_integers(data + np.uintp(offset)), 1)[0] = np.int32(flat[place])
+        place += 1
+    _set_state(model, data, row, np.int32(constants.state))
+    _step1(model, data)
+    for k in range(tables.real.shape[1]):
+        values = carray(_doubles(tables.real[world, k]), tables.reals[world, k])
+        values[:] = flat[place : place + len(values)]
+        place += len(values)
 
 
 @_compiled
-def end_putting_back(
-    constants: Constants, tables: Tables, chosen: Any, states: Any, awake: int
+def _read(constants: Constants, tables: Tables, world: int, states: Any) -> None:
+    """A world's state, as `SimulationState.flat` has it; the rest is zero."""
+    flat = states[world]
+    model, data = tables.robots.models[world], tables.robots.datas[world]
+    _get_state(model, data, flat.ctypes.data, np.int32(constants.state))
+    place = tables.states[world]
+    for k in range(tables.whole.shape[1]):
+        count = tables.wholes[world, k]
+        flat[place : place + count] = carray(_integers(tables.whole[world, k]), count)
+        place += count
+    for offset in constants.fields.awake:
+        flat[place] = carray(_integers(data + np.uintp(offset)), 1)[0]
+        place += 1
+    for k in range(tables.real.shape[1]):
+        count = tables.reals[world, k]
+        flat[place : place + count] = carray(_doubles(tables.real[world, k]), count)
+        place += count
+    flat[place:] = 0
+
+
+@_compiled
+def _measure(constants: Constants, tables: Tables, world: int, seen: Seen) -> None:
+    """What `measurement.measure` gives, of a world, and whether MuJoCo warns of it."""
+    fields, data = constants.fields, tables.robots.datas[world]
+    for k in range(seen.values.shape[1]):
+        seen.values[world, k] = carray(_doubles(tables.measured[world, k]), 1)[0]
+    seen.contacts[world] = False
+    first = carray(_addresses(data + np.uintp(fields.contacts)), 1)[0]
+    for contact in range(carray(_integers(data + np.uintp(fields.contact_count)), 1)[0]):
+        address = first + np.uintp(contact * fields.contact_bytes + fields.contact_geoms)
+        geoms = carray(_integers(address), 2)
+        one, other = tables.owners[world, geoms[0]], tables.owners[world, geoms[1]]
+        kind, slot = min(one, other), max(one, other)
+        if kind <= constants.right_pad and slot >= constants.first:
+            seen.contacts[world, kind, slot - constants.first] = True
+    seen.diverged[world] = False
+    for warning in constants.warnings:
+        address = data + np.uintp(fields.warnings + warning * fields.warning_bytes)
+        if carray(_integers(address), 1)[0] > 0:
+            seen.diverged[world] = True
+
+
+@_compiled
+def advance(
+    constants: Constants,
+    tables: Tables,
+    states: Any,
+    targets: Any,
+    kept: Any,
+    seen: Seen,
+    taken: Any,
 ) -> None:
-    """The second half of `write_simulation`: all after the counts, of which there are `awake`."""
-    for world in chosen:
-        flat = states[world]
-        model, data = tables.robots.models[world], tables.robots.datas[world]
-        _set_state(model, data, flat.ctypes.data, np.int32(constants.state))
-        _step1(model, data)
-        place = tables.states[world] + tables.wholes[world].sum() + awake
-        for k in range(tables.real.shape[1]):
-            values = carray(_doubles(tables.real[world, k]), tables.reals[world, k])
-            values[:] = flat[place : place + len(values)]
-            place += len(values)
+    """A control step of all worlds; threads that call it at once share them.
 
-
-@_compiled
-def read(constants: Constants, tables: Tables, awake: Any, states: Any) -> None:
-    """All states, as `SimulationState.flat` has them; what is longer stays as it is.
+    A world is put back, stepped and read while its data are at hand in the processor's cache.
 
     Args:
       constants, tables: Of all worlds.
-      awake: Counts of what is awake, (worlds, 4).
-      states: To be written, (worlds, values).
+      states: Whence the worlds go on, (worlds, values).
+      targets: Joint angles [rad] and openings [m], (worlds, substeps, 8).
+      kept: The states that the worlds' data are in, before and afterwards.
+      seen: To be written.
+      taken: How many worlds a thread has begun with, [0] at first; one array for all threads.
     """
-    for world in range(len(states)):
-        flat = states[world]
-        model, data = tables.robots.models[world], tables.robots.datas[world]
-        _get_state(model, data, flat.ctypes.data, np.int32(constants.state))
-        place = tables.states[world]
-        for k in range(tables.whole.shape[1]):
-            count = tables.wholes[world, k]
-            flat[place : place + count] = carray(_integers(tables.whole[world, k]), count)
-            place += count
-        flat[place : place + awake.shape[1]] = awake[world]
-        place += awake.shape[1]
-        for k in range(tables.real.shape[1]):
-            count = tables.reals[world, k]
-            flat[place : place + count] = carray(_doubles(tables.real[world, k]), count)
-            place += count
+    room = np.empty(7)
+    while True:
+        world = _take(taken.ctypes.data)
+        if world >= len(states):
+            return
+        if _differ(states, kept, world):
+            put_back(constants, tables, world, states)
+        robots = tables.robots
+        model, data = robots.models[world], robots.datas[world]
+        for substep in range(targets.shape[1]):
+            follow(constants, robots, world, targets[world, substep], room)
+            # The second half of a step, then the first of the next, as the CPU's environment steps.
+            _step2(model, data)
+            _step1(model, data)
+        _read(constants, tables, world, seen.states)
+        _measure(constants, tables, world, seen)
+        kept[world] = seen.states[world]
 
 
 @_compiled
-def measure(
-    constants: Constants, tables: Tables, counts: Any, values: Any, touched: Any, diverged: Any
-) -> None:
-    """What `measurement.measure` gives, of all worlds, and which of them MuJoCo warns of.
-
-    Args:
-      constants, tables: Of all worlds.
-      counts: Of contacts.
-      values, touched: Of a `FlatMeasurement`, to be written; nothing is touched yet.
-      diverged: To be written.
-    """
-    for world in range(len(values)):
-        for k in range(values.shape[1]):
-            values[world, k] = carray(_doubles(tables.measured[world, k]), 1)[0]
-        for contact in range(counts[world]):
-            address = tables.contacts[world] + np.uintp(contact) * tables.contact_bytes[world]
-            geoms = carray(_integers(address), 2)
-            one, other = tables.owners[world, geoms[0]], tables.owners[world, geoms[1]]
-            kind, slot = min(one, other), max(one, other)
-            if kind <= constants.right_pad and slot >= constants.first:
-                touched[world, kind, slot - constants.first] = True
-        diverged[world] = False
-        for warning in constants.warnings:
-            address = tables.warnings[world] + np.uintp(warning) * tables.warning_bytes[world]
-            if carray(_integers(address), 1)[0] > 0:
-                diverged[world] = True
+def _differ(states: Any, kept: Any, world: int) -> bool:
+    """Whether any bit does."""
+    size = states.shape[1]
+    row = states.ctypes.data + np.uintp(world * states.strides[0])
+    one, other = carray(_words(row), size), carray(_words(kept[world].ctypes.data), size)
+    difference = np.uint64(0)
+    for i in range(size):
+        difference |= one[i] ^ other[i]
+    return difference != 0
