@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from manipose_mj.small_matrices import product, sum_of_squares
+
 Array = Any  # a NumPy or a JAX array
 
 
@@ -46,15 +48,7 @@ def invert(pose: Float[Array, "*b 4 4"]) -> Float[Array, "*b 4 4"]:
     """The inverse of a rigid transform."""
     xp = namespace(pose)
     rotation = xp.matrix_transpose(pose[..., :3, :3])
-    return compose(rotation, -(rotation @ pose[..., :3, 3:])[..., 0])
-
-
-def chain(first: Float[Array, "*#b 4 4"], then: Float[Array, "*#b 4 4"]) -> Array:
-    """The pose `T_ac` of `T_ab` and `T_bc`."""
-    if namespace(first) is np:
-        return first @ then
-    # XLA's product of many small matrices takes ten times as long on the CPU.
-    return sum(first[..., :, i, None] * then[..., None, i, :] for i in range(4))
+    return compose(rotation, -product(rotation, pose[..., :3, 3:])[..., 0])
 
 
 def transform(pose: Float[Array, "*#b 4 4"], points: Float[Array, "*#b n 3"]) -> Array:
@@ -252,7 +246,7 @@ def pose_error(
     xp = namespace(estimate)
     translation = xp.sqrt(xp.sum((estimate[..., :3, 3] - truth[..., :3, 3]) ** 2, axis=-1))
     rotations = xp.asarray(symmetry.rotations, dtype=truth.dtype)
-    equivalents = truth[..., None, :3, :3] @ rotations
+    equivalents = product(truth[..., None, :3, :3], rotations)
     apart = estimate[..., None, :3, :3] - equivalents
     if symmetry.axial is True:
         squares = _squared_axis_chord(apart)
@@ -267,26 +261,14 @@ def pose_error(
 
 def _squared_chord(apart: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
     """Of the angle between two rotations, by their difference, on a circle of diameter 1."""
-    return _sum_of_squares(apart, 2) / 8
+    return sum_of_squares(apart, axes=2) / 8
 
 
 def _squared_axis_chord(apart: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
     """Of the angle between the X axes of two rotations, on the same circle."""
-    return _sum_of_squares(apart[..., 0], 1) / 4
+    return sum_of_squares(apart[..., 0]) / 4
 
 
 def _angle_of(squared_chord: Float[Array, "*b"]) -> Float[Array, "*b"]:
     xp = namespace(squared_chord)
     return 2 * xp.asin(xp.clip(xp.sqrt(squared_chord), 0.0, 1.0))
-
-
-def _sum_of_squares(values: Array, axes: int) -> Array:
-    """Over the last axes."""
-    xp = namespace(values)
-    if xp is np:
-        return np.sum(values**2, axis=tuple(range(-axes, 0)))
-    # XLA adds a few terms on the CPU ten times as fast as it reduces so short an axis.
-    squares = values**2
-    for _ in range(axes):
-        squares = sum(squares[..., i] for i in range(squares.shape[-1]))
-    return squares

@@ -37,7 +37,10 @@ ORDER = (
         *("manipose_mj.poses", "manipose_mj.storage", "manipose_mj.console", "manipose_mj.wire"),
         "manipose_mj.warp_physics",
     ),
-    ("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
+    (
+        *("manipose_mj.errors", "manipose_mj.failures", "manipose_mj.lazy_exports"),
+        "manipose_mj.small_matrices",
+    ),
 )
 # What scans and generators are made into is the package's; robots and tasks are none of the pipeline's business.
 PIPELINE_KNOWS = (

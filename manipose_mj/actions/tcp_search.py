@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.poses import Array, namespace
+from manipose_mj.small_matrices import product, product_with_vector, solve_positive, squared_length
 
 _LOW, _HIGH = POSITION_LIMITS.T
 
@@ -68,7 +69,7 @@ def search(
     joints = xp.clip(start, _LOW, _HIGH)
     error = error_at(joints)
     one = xp.ones_like(joints[0])
-    first = _Search(joints, error, error @ error, one, one < 0, xp.asarray(0))
+    first = _Search(joints, error, squared_length(error), one, one < 0, xp.asarray(0))
 
     def going(now: _Search) -> Bool[Array, ""]:
         unfinished = (now.squared >= config.tolerance**2) & (now.iterations < config.iterations)
@@ -80,7 +81,7 @@ def search(
             now.joints, jacobian_at(now.joints), now.error, damping, config.max_step
         )
         error = error_at(joints)
-        squared = error @ error
+        squared = squared_length(error)
         better = squared < now.squared
         return _Search(
             xp.where(better, joints, now.joints),
@@ -116,8 +117,8 @@ def damped_step(
     stepped = joints
     for _ in range(3):
         used = jacobian * moving
-        gram = used @ used.T + damping * xp.eye(6, dtype=joints.dtype)
-        step = used.T @ xp.linalg.solve(gram, error)
+        gram = product(used, used.T) + damping * xp.eye(6, dtype=joints.dtype)
+        step = product_with_vector(used.T, solve_positive(gram, error))
         step = step * xp.minimum(1.0, max_step / xp.maximum(xp.max(xp.abs(step)), 1e-12))
         free = joints + step
         stepped = xp.clip(free, _LOW, _HIGH)

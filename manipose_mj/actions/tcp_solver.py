@@ -14,6 +14,7 @@ from manipose_mj.actions.tcp_search import TcpSolverConfig, search
 from manipose_mj.mjcf.panda.kinematics import DH, FLANGE_OFFSET, HAND_YAW, TCP_OFFSET
 from manipose_mj.mjcf.panda.model import build_panda
 from manipose_mj.poses import Array, compose, namespace, rotation_to_quaternion
+from manipose_mj.small_matrices import product
 
 # Modified Denavit-Hartenberg parameters of the joints, and of the TCP on the last link.
 _ROWS = np.concatenate([DH, [[0.0, FLANGE_OFFSET + TCP_OFFSET, 0.0]]])
@@ -108,7 +109,7 @@ class PureTcpSolver:
 
         def error_at(joints: Float[Array, "7"]) -> Float[Array, "6"]:
             xp, own = namespace(joints), self.pose(joints)
-            turn = _rotation_vector(pose[:3, :3] @ own[:3, :3].T)
+            turn = _rotation_vector(product(pose[:3, :3], own[:3, :3].T))
             return xp.concat([pose[:3, 3] - own[:3, 3], lever * turn])
 
         def jacobian_at(joints: Float[Array, "7"]) -> Float[Array, "6 7"]:
@@ -136,7 +137,7 @@ def _axes_and_tcp(joints: Float[Array, "7"]) -> tuple[Float[Array, "7 4 4"], Flo
     steps = xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
     poses = [steps[0]]
     for step in steps[1:]:
-        poses.append(poses[-1] @ step)
+        poses.append(product(poses[-1], step))
     return xp.stack(poses[:7]), poses[7]
 
 

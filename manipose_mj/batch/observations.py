@@ -12,6 +12,7 @@ from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import unknown_name
 from manipose_mj.poses import Array, compose, invert, pose_to_vector
+from manipose_mj.small_matrices import product
 from manipose_mj.tasks.observations.sensors import parse_modes
 
 Observation = dict[str, Array]
@@ -57,7 +58,7 @@ class Observer:
         }
         world = self._world_poses(now, rows)
         cameras = invert(compose(now.camera_rotations * _OPENCV, now.camera_positions))
-        seen = cameras[:, None] @ world[:, :, None]
+        seen = product(cameras[:, None], world[:, :, None])
         for i, name in enumerate((*layout.frames, *layout.goal_frames)):
             shown[f"pose/{name}"] = world[:, i]
             # The robot's base is the world's origin.
@@ -76,7 +77,7 @@ class Observer:
         layout = self._layout
         first = len(layout.objects) + 2 * len(layout.parts)
         bodies = compose(now.rotations[:, first:], now.positions[:, first:])
-        return jnp.concatenate([bodies @ self._frames[rows], self._goals[rows]], axis=1)
+        return jnp.concatenate([product(bodies, self._frames[rows]), self._goals[rows]], axis=1)
 
 
 def _tcp_vector(tcp: Float[Array, "worlds 4 4"]) -> Float[Array, "worlds 7"]:

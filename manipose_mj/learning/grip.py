@@ -14,6 +14,7 @@ from jaxtyping import Float
 from manipose_mj.actions.tcp_motion import euler_angles
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import Array, compose, invert, rotation_to_quaternion, vector_to_pose
+from manipose_mj.small_matrices import product
 
 CONTROL_MODE, OBS_MODE = "pd_ee_pose", "state+pose"
 ACTIONS = 7
@@ -37,14 +38,14 @@ def command(
         rotation vector; and the opening.
     """
     action = jnp.clip(action, -1.0, 1.0)
-    now = invert(grip) @ tcp
+    now = product(invert(grip), tcp)
     away = _REACH * action[..., :3] - now[..., :3, 3]
     turn = rotation_vector(
-        rotation_matrix(_TILT * action[..., 3:6]) @ jnp.swapaxes(now[..., :3, :3], -1, -2)
+        product(rotation_matrix(_TILT * action[..., 3:6]), jnp.swapaxes(now[..., :3, :3], -1, -2))
     )
     position = now[..., :3, 3] + _at_most(away, _STEP)
-    rotation = rotation_matrix(_at_most(turn, _TURN)) @ now[..., :3, :3]
-    target = grip @ compose(rotation, position)
+    rotation = product(rotation_matrix(_at_most(turn, _TURN)), now[..., :3, :3])
+    target = product(grip, compose(rotation, position))
     opening = MAX_OPENING * (action[..., 6:] + 1) / 2
     return jnp.concatenate(
         [target[..., :3, 3], euler_angles(target[..., :3, :3]), opening], axis=-1
@@ -85,7 +86,7 @@ def rotation_matrix(vector: Float[Array, "*b 3"]) -> Float[Array, "*b 3 3"]:
     none = jnp.zeros_like(x)
     rows = [none, -z, y, z, none, -x, -y, x, none]
     skew = jnp.stack(rows, axis=-1).reshape(*x.shape, 3, 3) / angle
-    return jnp.eye(3) + jnp.sin(angle) * skew + (1 - jnp.cos(angle)) * skew @ skew
+    return jnp.eye(3) + jnp.sin(angle) * skew + (1 - jnp.cos(angle)) * product(skew, skew)
 
 
 def rotation_vector(rotation: Float[Array, "*b 3 3"]) -> Float[Array, "*b 3"]:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from manipose_mj.learning import grip
 from manipose_mj.learning.grip import Observation
 from manipose_mj.poses import Array, compose, invert
+from manipose_mj.small_matrices import product
 
 NEEDS: str = "a task that opens or shuts one drawer or door"
 SEEN: tuple[str, ...] = (
@@ -38,9 +39,9 @@ def grip_frame(observation: Observation) -> Float[Array, "*b 4 4"]:
 def features(observation: Observation) -> Float[Array, "*b n"]:
     """What the networks see: hand, robot, joint of the furniture and the vertical, in the grip frame."""
     to_grip = invert(grip_frame(observation))
-    joint = to_grip @ observation["pose/robot/joint"]
+    joint = product(to_grip, observation["pose/robot/joint"])
     seen = (
-        *grip.pose_features(to_grip @ grip.tcp_pose(observation)),
+        *grip.pose_features(product(to_grip, grip.tcp_pose(observation))),
         *grip.pose_features(joint),
         to_grip[..., :3, 3],  # the robot's base
         to_grip[..., :3, 2],  # the vertical

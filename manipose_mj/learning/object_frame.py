@@ -13,6 +13,7 @@ from jaxtyping import Float
 from manipose_mj.learning import grip
 from manipose_mj.learning.grip import Observation
 from manipose_mj.poses import Array, compose, invert
+from manipose_mj.small_matrices import product
 
 NEEDS: str = "a task about one object"
 SEEN: tuple[str, ...] = (
@@ -50,10 +51,10 @@ def grip_frame(observation: Observation) -> Float[Array, "*b 4 4"]:
 def features(observation: Observation) -> Float[Array, "*b n"]:
     """What the networks see: hand, robot, object and the room it takes, in the grip frame, of which z is the vertical."""
     to_grip = invert(grip_frame(observation))
-    T_grip_label = to_grip @ observation["pose/robot/object"]
+    T_grip_label = product(to_grip, observation["pose/robot/object"])
     _, *label = grip.pose_features(T_grip_label)
     seen = (
-        *grip.pose_features(to_grip @ grip.tcp_pose(observation)),
+        *grip.pose_features(product(to_grip, grip.tcp_pose(observation))),
         *label,
         *_room(observation, T_grip_label),
         to_grip[..., :3, 3],  # the robot's base, which is as high as the table

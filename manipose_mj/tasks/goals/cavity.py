@@ -9,6 +9,7 @@ from typing import ClassVar
 from jaxtyping import Bool, Float
 
 from manipose_mj.poses import Array, SymmetryGroup, compose, invert, namespace
+from manipose_mj.small_matrices import product
 from manipose_mj.tasks.goals import stages
 from manipose_mj.tasks.goals.conditions import Tolerance, at_rest, inside_cavity
 from manipose_mj.tasks.goals.goal import Goal, GoalFrame
@@ -112,10 +113,10 @@ class TakenOutGoal(Goal):
 
 def _in_cavity(obj: ObjectState, part: PartState) -> Float[Array, "*#b 4 4"]:
     """`T_cavity_box`: the label's axes, in the middle of the object's bounding box."""
-    pose = invert(part.cavity_pose) @ obj.label_pose
+    pose = product(invert(part.cavity_pose), obj.label_pose)
     xp = namespace(pose)
     center = xp.asarray(obj.center, dtype=pose.dtype)
-    moved = pose[..., :3, :3] @ center[..., None]
+    moved = product(pose[..., :3, :3], center[..., None])
     shift = xp.concat([xp.zeros_like(pose[..., :3, :3]), moved], axis=-1)
     return pose + xp.concat([shift, xp.zeros_like(pose[..., 3:, :])], axis=-2)
 

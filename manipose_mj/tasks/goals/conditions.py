@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from manipose_mj.poses import Array, SymmetryGroup, namespace, pose_error
+from manipose_mj.small_matrices import product
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def inside_cavity(
     dtype = label_pose_cavity.dtype
     half = xp.asarray(label_extents, dtype=dtype) / 2
     rotation = xp.abs(label_pose_cavity[..., :3, :3])
-    box = (rotation @ half[..., None])[..., 0]
+    box = product(rotation, half[..., None])[..., 0]
     along = rotation[..., 0]
     radius = xp.max(half[..., 1:], axis=-1, keepdims=True)
     cylinder = along * half[..., :1] + xp.sqrt(xp.clip(1 - along**2, 0.0, 1.0)) * radius

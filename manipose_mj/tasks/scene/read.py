@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from manipose_mj.poses import Array, chain, compose, namespace
+from manipose_mj.poses import Array, compose, namespace
+from manipose_mj.small_matrices import product
 from manipose_mj.tasks.scene.indices import LEFT_PAD, RIGHT_PAD, SceneIndices, SceneShapes
 from manipose_mj.tasks.scene.state import ObjectState, PartState, SceneState
 
@@ -43,7 +44,7 @@ def read(indices: SceneIndices, shapes: SceneShapes, data: PhysicsArrays) -> Sce
     """
     xp = namespace(data.qpos)
     bodies = compose(data.xmat[..., indices.bodies, :, :], data.xpos[..., indices.bodies, :])
-    frames = _each(chain(bodies, shapes.frames), 2)
+    frames = _each(product(bodies, shapes.frames), 2)
     velocities = data.qvel[..., indices.speeds]
     speeds = _each(xp.sqrt(xp.vecdot(velocities, velocities)), 1)
     openings = _each(data.qpos[..., indices.openings]) if indices.parts else []
