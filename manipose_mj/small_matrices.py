@@ -35,9 +35,9 @@ def squared_length(vector: Float[Array, " n"]) -> Array:
 
 def sum_of_squares(values: Float[Array, "*b"], axes: int = 1) -> Array:
     """Over the last axes."""
-    if isinstance(values, np.ndarray | np.generic):
-        return np.sum(values**2, axis=tuple(range(-axes, 0)))
-    squares = values**2
+    squares: Any = values**2
+    if isinstance(squares, np.ndarray | np.generic):
+        return np.sum(squares, axis=tuple(range(-axes, 0)))
     for _ in range(axes):
         squares = sum(squares[..., i] for i in range(squares.shape[-1]))
     return squares

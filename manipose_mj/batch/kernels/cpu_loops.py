@@ -183,8 +183,7 @@ _doubles, _integers = _pointer_to(types.float64), _pointer_to(types.int32)
 _words, _addresses = _pointer_to(types.uint64), _pointer_to(types.uintp)
 
 
-@intrinsic
-def _take(_: Any, address: Any) -> Any:
+def _atomic_increment(_: Any, address: Any) -> Any:
     """Counts up by one what is at an address, for all threads at once; returns what it was."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
@@ -192,6 +191,9 @@ def _take(_: Any, address: Any) -> Any:
         return builder.atomic_rmw("add", counter, ir.Constant(ir.IntType(64), 1), "monotonic")
 
     return types.int64(types.uintp), generate
+
+
+_take: Any = intrinsic(_atomic_increment)
 
 
 @_compiled

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -90,7 +90,8 @@ def _layout(name: str) -> type[ctypes.Structure]:
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _type(listed: object) -> type:
+def _type(listed: Any) -> Any:
+    """Of one field, as `mujoco.introspect` lists it."""
     if isinstance(listed, ast_nodes.PointerType):
         return ctypes.c_void_p
     if isinstance(listed, ast_nodes.ArrayType):
@@ -98,5 +99,4 @@ def _type(listed: object) -> type:
         for count in reversed(listed.extents):
             kind = kind * count
         return kind
-    assert isinstance(listed, ast_nodes.ValueType), listed
     return _PLAIN[listed.name] if listed.name in _PLAIN else _layout(listed.name)

@@ -71,7 +71,8 @@ class _Buffer(ctypes.Structure):
     def view(self) -> np.ndarray:
         shape, kind = self.shape[: self.rank], np.dtype(_KINDS[self.kind])
         size = math.prod(shape) * kind.itemsize
-        return np.frombuffer((ctypes.c_char * size).from_address(self.data), kind).reshape(shape)
+        memory: Any = (ctypes.c_char * size).from_address(self.data)
+        return np.frombuffer(memory, kind).reshape(shape)
 
 
 class _Buffers(ctypes.Structure):
