@@ -19,6 +19,7 @@ from manipose_mj.poses import Array, namespace
 from manipose_mj.small_matrices import product, product_with_vector, solve_positive, squared_length
 
 _LOW, _HIGH = POSITION_LIMITS.T
+_ROUNDS = 3  # in which joints may drop out of a step
 
 
 @dataclass(frozen=True)
@@ -113,17 +114,24 @@ def damped_step(
 ) -> Float[Array, "7"]:
     """The joints after one damped step; those that would cross a limit stay, the others make up for it."""
     xp = namespace(joints)
-    moving = xp.ones(7, dtype=bool)
-    stepped = joints
-    for _ in range(3):
+
+    def stepped(moving: Bool[Array, "7"]) -> tuple[Float[Array, "7"], Bool[Array, "7"]]:
+        """Where the joints that may move come to, and which of these may do so without crossing a limit."""
         used = jacobian * moving
         gram = product(used, used.T) + damping * xp.eye(6, dtype=joints.dtype)
         step = product_with_vector(used.T, solve_positive(gram, error))
         step = step * xp.minimum(1.0, max_step / xp.maximum(xp.max(xp.abs(step)), 1e-12))
         free = joints + step
-        stepped = xp.clip(free, _LOW, _HIGH)
-        crossed = stepped != free
-        if xp is np and not crossed.any():
+        allowed = xp.clip(free, _LOW, _HIGH)
+        return allowed, moving & (allowed == free)
+
+    now = joints, xp.ones(7, dtype=bool)
+    if xp is not np:
+        import jax
+
+        return jax.lax.fori_loop(0, _ROUNDS, lambda _, now: stepped(now[1]), now)[0]
+    for _ in range(_ROUNDS):
+        before, now = now[1], stepped(now[1])
+        if (now[1] == before).all():
             break  # another round would find the same
-        moving = moving & ~crossed
-    return stepped
+    return now[0]
