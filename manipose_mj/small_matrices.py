@@ -44,7 +44,10 @@ def sum_of_squares(values: Float[Array, "*b"], axes: int = 1) -> Array:
 
 
 def solve_positive(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Array:
-    """The solution of `matrix @ x = right` for a symmetric, positive definite matrix (Cholesky)."""
+    """The solution of `matrix @ x = right` for a symmetric, positive definite matrix (Cholesky).
+
+    In single precision its smallest eigenvalue has to be above some 1e-6 of its largest.
+    """
     if isinstance(matrix, np.ndarray):
         return np.linalg.solve(matrix, right)
     import jax.numpy as jnp

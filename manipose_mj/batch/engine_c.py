@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import jax
 import jax.numpy as jnp
@@ -22,7 +23,7 @@ from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
 
 class CEngine:
-    """Worlds are split evenly over threads, each of which steps its own."""
+    """Threads share the worlds, of which each steps the next that nobody has begun with."""
 
     name = "c"
 
@@ -38,10 +39,11 @@ class CEngine:
         self._simulator = Simulator(pool, worlds, threads=threads)
         self._one = pool.starts[0].measurement
         shapes = jax.ShapeDtypeStruct
+        self._physics = shapes((worlds, 2 * state_size(pool)), jnp.uint32)
         self._call = DirectCall(
             self._advance,
             (
-                shapes((worlds, 2 * state_size(pool)), jnp.uint32),
+                self._physics,
                 shapes((worlds,), jnp.bool_),
                 shapes((worlds, len(flat_values(self._one))), jnp.float32),
                 shapes((worlds, *self._one.contacts.shape), jnp.bool_),
@@ -61,6 +63,11 @@ class CEngine:
         rows: Int[Array, " worlds"],
         targets: Float[Array, "worlds substeps 8"],
     ) -> tuple[UInt32[Array, "worlds words"], Bool[Array, " worlds"], Measurement]:
+        expected = self._physics.shape
+        if physics.shape != expected:
+            raise InputError(
+                f"the state is of other worlds: its simulation has shape {physics.shape}, expected {expected}"
+            )
         after, diverged, values, contacts = self._call(physics, rows.astype(jnp.int32), targets)
         return after, diverged, FlatMeasurement(values, contacts).split(self._one)
 
@@ -103,6 +110,9 @@ class CEngine:
         return np.arange(len(self._pool.starts[row].instances))
 
     def close(self) -> None:
+        # Of steps that are still to be made the results may be needed; who asks for them learns of errors.
+        with suppress(jax.errors.JaxRuntimeError):
+            jax.effects_barrier()
         self._simulator.close()
 
     def _advance(

@@ -70,8 +70,13 @@ class Simulator:
             state of one that did has no meaning.
 
         Raises:
-          InputError: The simulator is closed.
+          InputError: The simulator is closed, or states or rows are of other worlds.
         """
+        if states.shape != self._kept.shape or rows.shape != self._rows.shape:
+            raise InputError(
+                f"states of shape {states.shape} and rows of {rows.shape}; these worlds have {self._kept.shape} and "
+                f"{self._rows.shape}"
+            )
         # One call at a time, as there is one set of data.
         with self._lock:
             if self._closed:
@@ -112,10 +117,14 @@ class Simulator:
             advance(*given)
             return
         running = [self._threads.submit(advance, *given) for _ in range(self._shares)]
-        try:
-            wait(running)
-        finally:
-            wait(running)  # for what goes on after an interruption, and has the data
+        interruption: BaseException | None = None
+        while not all(each.done() for each in running):
+            try:
+                wait(running)
+            except BaseException as error:  # what goes on has the data, and writes to what is seen
+                interruption = error
+        if interruption is not None:
+            raise interruption
         for each in running:
             each.result()
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -63,3 +65,18 @@ def test_a_compiled_function_that_outlives_it_says_so():
     gc.collect()
     with pytest.raises(jax.errors.JaxRuntimeError, match="keep its worlds as long as it"):
         jax.block_until_ready(compiled(jnp.zeros((2, 3)), jnp.zeros(2)))
+
+
+def test_a_program_that_ends_waits_for_a_call_that_nobody_waits_for():
+    program = """
+import time, jax, jax.numpy as jnp
+from manipose_mj.batch.kernels.direct_call import DirectCall
+
+def slow(before, after):
+    time.sleep(0.5)
+    after[:] = before
+
+call = DirectCall(slow, [jax.ShapeDtypeStruct((300, 300), jnp.float32)])
+result = jax.jit(lambda x: call(x @ x))(jnp.ones((300, 300)))
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

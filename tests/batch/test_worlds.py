@@ -346,3 +346,31 @@ def test_without_a_gpu_one_line_says_what_is_missing():
     ) as caught:
         batch.from_pool(Path("nowhere"), 3, "warp")
     assert "\n" not in str(caught.value)
+
+
+def test_steps_that_were_asked_for_before_worlds_are_closed_are_made():
+    some = make(TASK, 2, seeds=(7,))
+    actions = wandering(3, 2)
+    expected = some.at([7, 7])
+    for action in actions:
+        expected = jax.block_until_ready(some.step(expected, action))
+    again = make(TASK, 2, seeds=(7,))
+    state = again.at([7, 7])
+    for action in actions:
+        state = again.step(state, action)
+    again.close()
+    equal(state.simulation, expected.simulation)
+    some.close()
+
+
+def test_a_state_of_other_worlds_is_refused(worlds):
+    state, action = worlds.at([7, 8, 7]), wandering(1, 3)[0]
+    wider = jnp.pad(state.simulation, ((0, 0), (0, 2)))
+    with pytest.raises(InputError, match=r"the state is of other worlds: .* expected \(3, \d+\)"):
+        worlds.step(state._replace(simulation=wider), action)
+    simulator, states = Simulator(worlds.pool, 3), np.asarray(wider).view(float)
+    with pytest.raises(
+        InputError, match=r"states of shape \(3, \d+\) .* these worlds have \(3, \d+\)"
+    ):
+        simulator.advance(states, np.array([0, 1, 0]), np.zeros((3, 1, 8)), simulator.room())
+    simulator.close()

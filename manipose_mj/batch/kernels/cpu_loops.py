@@ -22,7 +22,6 @@ from numba.core import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
-from manipose_mj.batch.kernels.data_fields import DataFields
 from manipose_mj.errors import InputError
 
 _LIBRARY = re.compile(r"(lib)?mujoco[.\d]*(\.so[.\d]*|\.dylib|\.dll)")
@@ -31,6 +30,29 @@ _FUNCTIONS = (
 )  # fmt: skip
 # The TCP moves less than its joints sweep, whatever rounding does to either.
 _SURELY = 1 - 1e-9
+
+
+# What the loops take is defined here: Numba compiles anew when this file changes, and looks at no other.
+class DataFields(NamedTuple):
+    """Numbers of bytes from the beginning of an `mjData`, unless said otherwise.
+
+    Attributes:
+      awake: Of the counts of what is awake.
+      contact_count: Of how many contacts there are.
+      contacts: Of the address of the first.
+      contact_bytes: From one contact to the next.
+      contact_geoms: From a contact to its geoms.
+      warnings: Of the first counter of warnings.
+      warning_bytes: From one to the next.
+    """
+
+    awake: np.ndarray
+    contact_count: int
+    contacts: int
+    contact_bytes: int
+    contact_geoms: int
+    warnings: int
+    warning_bytes: int
 
 
 class Constants(NamedTuple):

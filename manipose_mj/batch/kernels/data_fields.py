@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes
 from mujoco.introspect.structs import STRUCTS
 
+from manipose_mj.batch.kernels.cpu_loops import DataFields
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS
 
@@ -28,28 +29,6 @@ _PLAIN = {
     "uint64_t": ctypes.c_uint64,
     "uintptr_t": ctypes.c_void_p,
 }
-
-
-class DataFields(NamedTuple):
-    """Numbers of bytes from the beginning of an `mjData`, unless said otherwise.
-
-    Attributes:
-      awake: Of the counts of what is awake.
-      contact_count: Of how many contacts there are.
-      contacts: Of the address of the first.
-      contact_bytes: From one contact to the next.
-      contact_geoms: From a contact to its geoms.
-      warnings: Of the first counter of warnings.
-      warning_bytes: From one to the next.
-    """
-
-    awake: np.ndarray
-    contact_count: int
-    contacts: int
-    contact_bytes: int
-    contact_geoms: int
-    warnings: int
-    warning_bytes: int
 
 
 @cache

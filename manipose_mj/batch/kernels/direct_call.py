@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import logging
 import math
 from collections.abc import Callable, Sequence
 from ctypes import POINTER, c_char_p, c_int, c_int64, c_size_t, c_void_p
@@ -20,6 +21,8 @@ import numpy as np
 from jaxtyping import Array
 
 from manipose_mj.errors import InputError
+
+log = logging.getLogger(__name__)
 
 _TARGET = "manipose_mj_direct_call"
 _METADATA, _UNKNOWN = 1, 2  # a kind of extension, and a code of errors
@@ -127,13 +130,14 @@ class DirectCall:
 
         Args:
           function: Given an array for each argument, to be read, then one for each result, to be written; all of them
-            only for as long as it runs. What it raises becomes a `jax.errors.JaxRuntimeError`. It may be called by any
-            thread.
+            only for as long as it runs. What it raises becomes a `jax.errors.JaxRuntimeError` where somebody waits for a
+            result. It may be called by any thread, after the call has returned.
           results: Their shapes and types.
         """
         self._function, self._results = function, tuple(results)
         self._number = np.int64(next(_numbers))
-        self._call = jax.ffi.ffi_call(_TARGET, self._results)
+        # With an effect, a program that ends waits for it, and so can `jax.effects_barrier`.
+        self._call = jax.ffi.ffi_call(_TARGET, self._results, has_side_effect=True)
         _calls[int(self._number)] = self
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
@@ -173,6 +177,8 @@ def _handle(pointer: Any) -> int | None:
             )
         call._function(*frame.arguments.views(), *frame.results.views())
     except BaseException as error:  # nobody in XLA could catch it
+        if not isinstance(error, InputError):
+            log.exception("a function that JAX called failed")
         message = f"{type(error).__name__}: {error}".encode()
         told = _Error(ctypes.sizeof(_Error), None, message, _UNKNOWN)
         return api.create_error(ctypes.byref(told))
