@@ -53,9 +53,8 @@ class CEngine:
     def starts(self) -> UInt32[Array, "starts words"]:
         size = state_size(self._pool)
         states = np.stack([packed(start.simulation, size) for start in self._pool.starts])
-        return jnp.asarray(
-            states.view(np.uint32)
-        )  # double precision as words, which JAX leaves as they are
+        # Double precision as words, which JAX leaves as they are.
+        return jnp.asarray(states.view(np.uint32))
 
     def advance(
         self,
