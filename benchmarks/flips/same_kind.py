@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from itertools import permutations, product
 from pathlib import Path
 
 import jax
@@ -23,6 +22,7 @@ from flip_table import FLIPPED, RIGHT, network_of
 from jaxtyping import Float
 from scan_views import SOURCES, chosen
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from asset_pipeline.labelling.overrides.reading import read_overrides
 from asset_pipeline.labelling.scan_label import scan_label
@@ -37,6 +37,7 @@ ROUNDS, FREE_ROUNDS = 8, 5  # of matching; the last of them stretch as well
 NEAR = 0.9  # share of the cloud that is matched
 STRETCH = 0.6, 1.6  # along an axis, of the mean
 FAR = 0.1  # of the scan's size, beyond which distances count as this
+TURNS = Rotation.create_group("O").as_matrix().round()  # a cube's
 
 
 def main() -> None:
@@ -74,18 +75,6 @@ def main() -> None:
         shares = [(off > FLIPPED).mean(axis=0), (off <= RIGHT).mean(axis=0)]
         cells = [", ".join(f"{share:.0%}" for share in row) for row in shares]
         print(f"| {'catalogue' if known else 'others'} | {len(off)} | {cells[0]} | {cells[1]} |")
-
-
-def _turns() -> list[Float[np.ndarray, "3 3"]]:
-    matrices = [
-        np.eye(3)[list(order)] * np.array(signs)[:, None]
-        for order in permutations(range(3))
-        for signs in product((1.0, -1.0), repeat=3)
-    ]
-    return [matrix for matrix in matrices if np.linalg.det(matrix) > 0]
-
-
-TURNS = _turns()
 
 
 def surfaces(

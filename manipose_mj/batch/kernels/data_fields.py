@@ -19,8 +19,6 @@ from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.simulation_state import AWAKE_COUNTS
 
 _PLAIN = {
-    "double": ctypes.c_double,
-    "float": ctypes.c_float,
     "int": ctypes.c_int,
     "mjtBool": ctypes.c_bool,
     "mjtNum": ctypes.c_double,
