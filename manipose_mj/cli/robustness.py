@@ -29,11 +29,14 @@ def robustness(
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     seed: int = 0,
     friction: float = 1.5,
+    pad_friction: float = 1.5,
     mass: float = 1.4,
     gains: float = 1.2,
     latency_ms: float = 40.0,
     shift_cm: float = 1.0,
     turn_deg: float = 5.0,
+    object_shift_cm: float = 0.5,
+    object_turn_deg: float = 2.0,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     jobs: int = CORES,
 ) -> int:
@@ -49,12 +52,15 @@ def robustness(
       engine: warp, on an NVIDIA GPU; c, on the CPU; auto, the former where it runs.
       out: Folder to write to; without it robustness/NAME.
       seed: Of the draws.
-      friction: Factor by which friction differs at most, up or down; that of the finger pads stays.
+      friction: Factor by which friction differs at most, up or down, between what is not touched by the finger pads.
+      pad_friction: The same for the finger pads, whatever they touch.
       mass: The same for objects' masses.
       gains: The same for the stiffness of each servo, the gripper's too.
       latency_ms: Most by which set-points come late.
-      shift_cm: Most by which objects and furniture stand, as one, beside where the plan has them.
+      shift_cm: Most by which objects and furniture stand, as one, beside where the plan has them: a wrong calibration.
       turn_deg: Most by which they are turned about the first object; this carries what stands beside it farther than shift_cm.
+      object_shift_cm: Most by which each object stands beside that: an error of its pose.
+      object_turn_deg: Most by which each object is turned about the vertical.
       objects: What plans recorded now draw from: names of built-in objects, asset folders, or folders of them.
       jobs: Processes that record plans, and threads of the engine `c` that replay them.
     """
@@ -80,7 +86,17 @@ def robustness(
     out = out or Path("robustness") / task.rpartition("/")[2]
     if (out / RESULTS).exists():
         raise InputError(f"{out / RESULTS}: is there already; choose another --out")
-    variation = Variation(friction, mass, gains, latency_ms, shift_cm, turn_deg)
+    variation = Variation(
+        friction,
+        pad_friction,
+        mass,
+        gains,
+        latency_ms,
+        shift_cm,
+        turn_deg,
+        object_shift_cm,
+        object_turn_deg,
+    )
     chosen = available_engine(engine)
     with output.Progress("plans") as progress:
 

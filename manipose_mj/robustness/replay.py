@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import ceil
 
 import jax
 import numpy as np
@@ -29,7 +30,7 @@ class Replay:
     Attributes:
       plan: Seed of the episode that it was made in.
       drawn: What differs from that, by the names of `variation.DRAWN`.
-      success: Whether the goals are met half a second after the plan's last set-point.
+      success: Whether the goals are met half a second after the plan's last set-point has come.
       once: Whether they were at any time until then.
       valid: Whether the physics counts: it did not diverge, and there was room for all contacts.
     """
@@ -117,7 +118,11 @@ def _played(
     threads: int,
 ) -> list[Replay]:
     actions = {plan.seed: plan.actions for plan in plans.plans}
-    steps = max(len(each) for each in actions.values()) + AFTER
+    last = [
+        len(actions[start.seed]) + AFTER + ceil(start.latency / pool.layout.substeps)
+        for start in pool.starts
+    ]
+    steps = max(last)
     longer = replace(pool.layout, horizon=max(steps + 1, pool.layout.horizon))
     pool = replace(pool, layout=longer)
     worlds = from_pool(pool, len(pool.starts), engine, threads=threads)
@@ -128,9 +133,8 @@ def _played(
     worlds.close()
     found: list[Replay] = []
     for world in np.argsort(rows):
-        start = pool.starts[rows[world]]
-        last = len(actions[start.seed]) + AFTER
-        found.append(_outcome(seen, int(world), last, start.seed, drawn[rows[world]]))
+        row = rows[world]
+        found.append(_outcome(seen, int(world), last[row], pool.starts[row].seed, drawn[row]))
     return found
 
 

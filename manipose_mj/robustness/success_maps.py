@@ -13,17 +13,20 @@ from matplotlib.figure import Figure
 
 from manipose_mj.evaluation.statistics import wilson_interval
 from manipose_mj.robustness.replay import Replay
-from manipose_mj.robustness.variation import DRAWN, Variation
+from manipose_mj.robustness.variation import DRAWN, FACTORS, Variation
 
 BINS = 5
-MAP = ("shift_cm", "friction")
+MAP = ("shift_cm", "pad_friction")
 _LABELS = {
-    "friction": "friction, factor",
+    "friction": "friction of surfaces, factor",
+    "pad_friction": "friction of the finger pads, factor",
     "mass": "mass, factor",
     "gains": "servo stiffness, factor",
     "latency_ms": "latency [ms]",
     "shift_cm": "all shifted by [cm]",
-    "turn_deg": "turned about the first object [deg]",
+    "turn_deg": "all turned about the first object [deg]",
+    "object_shift_cm": "first object shifted by [cm]",
+    "object_turn_deg": "first object turned [deg]",
 }
 
 
@@ -56,8 +59,8 @@ def curve(found: Sequence[Replay], name: str) -> list[dict[str, Any]]:
 
 def draw(document: dict[str, Any], path: Path) -> None:
     """Write the picture (PNG, SVG or PDF, by the path's ending)."""
-    figure = Figure(figsize=(11, 6.4), layout="constrained")
-    places = figure.subplots(2, 4)
+    figure = Figure(figsize=(11, 9.4), layout="constrained")
+    places = figure.subplots(3, 4)
     for axes, name in zip(places.flat, DRAWN, strict=False):
         rows = [row for row in document["by_value"][name] if row["worlds"]]
         if not rows:
@@ -70,15 +73,17 @@ def draw(document: dict[str, Any], path: Path) -> None:
         axes.set_ylim(0, 1.02)
         axes.set_xlabel(_LABELS[name])
         axes.set_ylabel("share of success")
-    _draw_map(figure, places[1, 2], document)
-    places[1, 3].axis("off")
+    for axes in places.flat[len(DRAWN) : -2]:
+        axes.axis("off")
+    _draw_map(figure, places[2, 2], document)
+    places[2, 3].axis("off")
     planned, varied = document["as_planned"], document["varied"]
     lines = (
         document["task"],
         f"as planned: {planned['successes']} of {planned['worlds']}",
         f"varied: {varied['successes']} of {varied['worlds']}",
     )
-    places[1, 3].text(0, 0.8, "\n".join(lines), va="top")
+    places[2, 3].text(0, 0.8, "\n".join(lines), va="top")
     figure.savefig(path, dpi=120)
 
 
@@ -101,8 +106,7 @@ def _draw_map(figure: Figure, axes: Any, document: dict[str, Any]) -> None:
 
 
 def _departs(replay: Replay) -> dict[str, bool]:
-    factors = ("friction", "mass", "gains")
-    return {name: abs(value - (name in factors)) > 1e-9 for name, value in replay.drawn.items()}
+    return {name: abs(value - (name in FACTORS)) > 1e-9 for name, value in replay.drawn.items()}
 
 
 def _bins(found: Sequence[Replay], name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from manipose_mj.robustness import replay
 from manipose_mj.robustness.plans import Plans, RecordedPlan, recorded_plans
 from manipose_mj.robustness.replay import Replay, replays
 from manipose_mj.robustness.success_maps import document, draw
-from manipose_mj.robustness.variation import DRAWN, Variation, Varied
+from manipose_mj.robustness.variation import DRAWN, ERRORS, FACTORS, Variation, Varied
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
 TASK, SEED = "single_object/target_pose", 3
@@ -31,19 +31,64 @@ def environment():
 
 
 def test_draws_stay_within_their_bounds_and_move_object_but_not_goal(environment):
-    variation, start = Variation(friction=2.0, shift_cm=3.0), environment.task.start
+    variation = Variation(friction=2.0, shift_cm=3.0, object_shift_cm=0.0, object_turn_deg=0.0)
+    start = environment.task.start
     varied, rng = Varied(environment, variation), np.random.RandomState(0)
     for _ in range(20):
         other, drawn = varied.draw(start, rng)
         assert set(drawn) == set(DRAWN)
-        for name, most in (("friction", 2.0), ("mass", 1.4), ("gains", 1.2)):
+        for name, most in (("friction", 2.0), ("pad_friction", 1.5), ("mass", 1.4)):
             assert 1 / most <= drawn[name] <= most
+        assert 1 / 1.2 <= drawn["gains"] <= 1.2
         for name, most in (("latency_ms", 40.0), ("shift_cm", 3.0), ("turn_deg", 5.0)):
             assert abs(drawn[name]) <= most
+        assert drawn["object_shift_cm"] == drawn["object_turn_deg"] == 0.0
         moved = other.objects["object"].pose[:3, 3] - start.objects["object"].pose[:3, 3]
         assert np.linalg.norm(moved) == pytest.approx(drawn["shift_cm"] / 100)
         assert moved[2] == 0 and other.goals is start.goals
         assert other.model.latency == pytest.approx(drawn["latency_ms"] / 1000)
+
+
+def test_the_pads_grip_is_drawn_apart_from_other_friction(environment):
+    pads = environment.physics.bind(environment.task.robot.pad_geoms).element_id
+    others = np.setdiff1d(np.arange(environment.physics.model.ngeom), pads)
+    compiled = np.array(environment.physics.model.geom_friction)
+    rng, start = np.random.RandomState(0), environment.task.start
+    other, drawn = Varied(environment, Variation(friction=1.0, pad_friction=4.0)).draw(start, rng)
+    friction = other.model.fields["geom_friction"]
+    assert drawn["friction"] == 1.0 and abs(np.log(drawn["pad_friction"])) > 0.1
+    np.testing.assert_allclose(friction[pads, 0], drawn["pad_friction"] * compiled[pads, 0])
+    np.testing.assert_array_equal(friction[others], compiled[others])
+    alone = Variation(1.0, 4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    other, drawn = Varied(environment, alone).draw(start, rng)
+    np.testing.assert_array_equal(other.model.fields["geom_friction"][pads, 1:], compiled[pads, 1:])
+    assert set(other.model.fields) >= {"body_mass", "actuator_gainprm"}
+
+
+def test_objects_have_errors_of_their_own_and_are_not_put_into_others():
+    made = suite.make(EnvConfig("clutter/pick", obs_mode="state"), 1)
+    made.reset(EpisodeSpec(seed=1))
+    start, rng = made.task.start, np.random.RandomState(0)
+    variation = Variation(shift_cm=0.0, turn_deg=0.0, object_shift_cm=6.0, object_turn_deg=40.0)
+    varied, moves = Varied(made, variation), []
+    before = varied.depth(start)
+    for _ in range(3):
+        other, drawn = varied.draw(start, rng)
+        assert varied.depth(other) < before + 0.001
+        shifts = {}
+        for name, placed in other.objects.items():
+            shifts[name] = placed.pose[:3, 3] - start.objects[name].pose[:3, 3]
+        moves.append(np.linalg.norm(list(shifts.values()), axis=1))
+        assert all(abs(shift[2]) < 1e-12 for shift in shifts.values())
+        first = next(iter(start.objects))
+        assert 100 * np.linalg.norm(shifts[first]) == pytest.approx(drawn["object_shift_cm"])
+        turn = other.objects[first].pose[:3, :3] @ start.objects[first].pose[:3, :3].T
+        angle = np.rad2deg(np.arctan2(turn[1, 0], turn[0, 0]))
+        assert turn[2, 2] == pytest.approx(1) and angle == pytest.approx(drawn["object_turn_deg"])
+    assert np.ptp(moves, axis=1).min() > 0.005 and np.max(moves) <= 0.06
+    bare = Variation(shift_cm=0.0, turn_deg=0.0, object_shift_cm=30.0)
+    crowded = [Varied(made, bare).draw(start, rng)[0] for _ in range(3)]
+    assert all(varied.depth(each) < before + 0.001 for each in crowded)
 
 
 def test_the_world_of_a_plan_is_that_of_its_episode_whatever_was_drawn_before():
@@ -79,10 +124,11 @@ def test_plans_that_do_nothing_succeed_nowhere_and_worlds_are_shared_out(monkeyp
 
 def test_maps_count_valid_worlds_alone(tmp_path):
     rng = np.random.default_rng(0)
-    found = [Replay(0, dict(zip(DRAWN, (1.0, 1.0, 1.0, 0, 0, 0), strict=True)), True, True, True)]
+    nothing = dict.fromkeys(FACTORS, 1.0) | dict.fromkeys(ERRORS, 0.0)
+    found = [Replay(0, nothing, True, True, True)]
     for number in range(40):
-        values = rng.uniform(1.1, 1.4, 3), rng.uniform(1, 5, 3)
-        drawn = dict(zip(DRAWN, np.concatenate(values).tolist(), strict=True))
+        values = rng.uniform(1.1, 1.4, len(FACTORS)), rng.uniform(1, 5, len(ERRORS))
+        drawn: dict[str, float] = dict(zip(DRAWN, np.concatenate(values).tolist(), strict=True))
         good = drawn["shift_cm"] < 3
         found.append(Replay(0, drawn, good, good, number > 0))
     said = document(TASK, Variation(), found, engine="c")
@@ -100,6 +146,10 @@ def test_wrong_input_is_one_line(tmp_path, capsys):
         Variation(friction=0.5)
     with pytest.raises(InputError, match="--shift-cm is -1"):
         Variation(shift_cm=-1.0)
+    with pytest.raises(InputError, match="--latency-ms is 60000; expected less than 10000"):
+        Variation(latency_ms=60000)
+    with pytest.raises(InputError, match="--object-turn-deg is nan; expected 0 or more"):
+        Variation(object_turn_deg=float("nan"))
     with pytest.raises(InputError, match="holds no demonstrations"):
         recorded_plans(TASK, str(tmp_path), 1)
     with pytest.raises(InputError, match="plans is 0"):
@@ -113,12 +163,29 @@ def test_wrong_input_is_one_line(tmp_path, capsys):
         assert said in capsys.readouterr().err
 
 
+@pytest.fixture(scope="module")
+def plans():
+    return recorded_plans(TASK, "seeds", 1, objects=("box_000",))
+
+
 @pytest.mark.full
-def test_a_recorded_plan_succeeds_where_it_was_made(tmp_path):
-    plans = recorded_plans(TASK, "seeds", 1, objects=("box_000",))
+def test_a_recorded_plan_succeeds_where_it_was_made(plans):
     assert plans.config.control_mode == layout.RECORDED_MODE
     (found,) = replays(plans, Variation(), 1, engine="c")
     assert found.success and found.valid
+
+
+@pytest.mark.full
+def test_a_plan_fails_with_slippery_pads_and_waits_for_late_set_points(plans):
+    slippery = Variation(1.0, 1e4, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    found = replays(plans, slippery, 9, engine="c")
+    assert not any(each.success for each in found if each.drawn["pad_friction"] < 0.01)
+    assert all(each.success for each in found if each.drawn["pad_friction"] > 0.8)
+    assert 2 <= sum(each.drawn["pad_friction"] < 0.1 for each in found) <= 6
+    late = Variation(1.0, 1.0, 1.0, 1.0, 5000.0, 0.0, 0.0, 0.0, 0.0)
+    found = replays(plans, late, 5, engine="c")
+    assert all(each.success for each in found)
+    assert max(each.drawn["latency_ms"] for each in found) > 1000
 
 
 @pytest.mark.full
