@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -21,6 +22,9 @@ from manipose_mj.mjcf.cameras.ray_camera import RayCamera
 from manipose_mj.poses import Array
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
+# Of a world, times the values of its data: what MuJoCo and XLA write beside these.
+_SCRATCH = 10
+
 
 class CEngine:
     """Threads share the worlds, of which each steps the next that nobody has begun with."""
@@ -34,8 +38,12 @@ class CEngine:
           pool: Of starts.
           worlds: How many there are.
           threads: That step them.
+
+        Raises:
+          InputError: This machine has too little memory.
         """
         self._pool, self._worlds = pool, worlds
+        self._require_room()
         self._simulator = Simulator(pool, worlds, threads=threads)
         self._one = pool.starts[0].measurement
         shapes = jax.ShapeDtypeStruct
@@ -49,6 +57,20 @@ class CEngine:
                 shapes((worlds, *self._one.contacts.shape), jnp.bool_),
             ),
         )
+
+    def _require_room(self) -> None:
+        """Raises InputError where this machine has less memory than the worlds take."""
+        if not hasattr(os, "sysconf"):
+            return
+        one = max(mujoco.MjData(model).nbuffer for model in self._pool.scenes)
+        model = max(mujoco.mj_sizeModel(model) for model in self._pool.scenes)
+        needed = _SCRATCH * one * self._worlds + model * min(self._worlds, len(self._pool.starts))
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        if needed > there:
+            raise InputError(
+                f"{self._worlds} worlds of this task take about {needed / 1e9:.0f} GB of memory; "
+                f"this machine has {there / 1e9:.0f} GB: make fewer"
+            )
 
     def starts(self) -> UInt32[Array, "starts words"]:
         size = state_size(self._pool)
@@ -71,7 +93,7 @@ class CEngine:
         return after, diverged, FlatMeasurement(values, contacts).split(self._one)
 
     def overflowed(self, physics: UInt32[Array, "worlds words"]) -> Bool[Array, " worlds"]:
-        return jnp.zeros(len(physics), bool)
+        return (physics[:, -2:] != 0).any(axis=1)  # the words of a state's last value
 
     def renderer(
         self, cameras: tuple[str, ...], height: int, width: int, rgb: bool

@@ -133,7 +133,14 @@ class Simulator:
         self._rows[number] = -1
         model = self._models.at(row)
         start = self._pool.starts[row]
-        servos = Servos.of(model, mujoco.MjData(model), start.addresses.servos)
+        try:
+            data = mujoco.MjData(model)
+        except mujoco.FatalError as error:
+            raise InputError(
+                f"world {number} of {len(self._rows)}: no memory for {model.narena / 1e6:.0f} MB more "
+                "of addresses: make fewer worlds, or raise the process's limit"
+            ) from error
+        servos = Servos.of(model, data, start.addresses.servos)
         self._servos[number] = servos
         enter(self._tables, number, start, servos)
         self._rows[number] = row
@@ -146,8 +153,8 @@ class Simulator:
 
 
 def state_size(pool: StartPool) -> int:
-    """Length of a state that any world fits in."""
-    return max(len(start.simulation) for start in pool.starts)
+    """Length of a state that any world fits in, with a last value that says whether anything was left out."""
+    return max(len(start.simulation) for start in pool.starts) + 1
 
 
 def packed(state: Float[np.ndarray, "n"], size: int) -> Float[np.ndarray, " size"]:

@@ -20,6 +20,7 @@ from manipose_mj.tasks.scene.indices import FIRST, NOBODY, RIGHT_PAD
 
 # What MuJoCo warns of when a simulation diverges, as dm_control asks for it.
 _DIVERGED = ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+_FULL = ("CONTACTFULL", "CNSTRFULL")
 
 
 class _Addresses:
@@ -44,11 +45,16 @@ def constants() -> Constants:
         tcp_lead=float(TCP_LEAD),
         max_opening=float(MAX_OPENING),
         state=int(STATE),
-        warnings=np.array([int(getattr(mujoco.mjtWarning, f"mjWARN_{n}")) for n in _DIVERGED]),
+        diverged=_numbers(_DIVERGED),
+        full=_numbers(_FULL),
         right_pad=RIGHT_PAD,
         first=FIRST,
         fields=data_fields(),
     )
+
+
+def _numbers(warnings: tuple[str, ...]) -> np.ndarray:
+    return np.array([int(getattr(mujoco.mjtWarning, f"mjWARN_{name}")) for name in warnings])
 
 
 def empty_tables(pool: StartPool, worlds: int) -> Tables:

@@ -88,6 +88,28 @@ def test_a_diverged_world_fails_alone_and_begins_anew(worlds):
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(after.observation))
 
 
+def test_what_mujoco_left_out_is_flagged_until_the_episode_ends(worlds):
+    actions, begun = wandering(4, 3), worlds.at([7, 8, 7])
+    state = jax.block_until_ready(worlds.step(begun, actions[0]))
+    assert not np.any(state.overflowed)
+    full = int(mujoco.mjtWarning.mjWARN_CNSTRFULL)
+    worlds.engine._simulator.held(1)[1].warning[full].number = 1
+    state = worlds.step(state, actions[1])
+    assert np.asarray(state.overflowed).tolist() == [False, True, False]
+    assert not np.any(state.terminated)
+    # Also of a world that was put back to this state.
+    jax.block_until_ready(worlds.step(begun, actions[0]))
+    later = worlds.step(state, actions[2])
+    assert np.asarray(later.overflowed).tolist() == [False, True, False]
+    again = worlds.step(worlds.step(begun, actions[0]), actions[1])
+    assert not np.any(again.overflowed)
+    unflagged = state.simulation.at[:, -2:].set(0)
+    np.testing.assert_array_equal(unflagged, again.simulation)
+    ended = worlds.step(later._replace(count=jnp.array([3, 3, 3])), actions[3])
+    assert np.asarray(ended.overflowed).tolist() == [False, True, False]
+    assert not np.any(worlds.step(ended, actions[0]).overflowed)
+
+
 def test_success_once_is_of_the_episode_that_ended(worlds):
     state = worlds.at([7, 8, 7])
     opened = state.measurement.openings.at[0].set(0.0)
@@ -336,6 +358,26 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
     for hold in (0, -3):
         with pytest.raises(InputError, match="hold is .*; expected a whole number, at least 1"):
             worlds.step(state, np.zeros((3, 8)), hold)
+
+
+def test_too_many_worlds_for_the_memory_are_refused_before_they_are_made(worlds, monkeypatch):
+    pages = {"SC_PHYS_PAGES": 1000, "SC_PAGE_SIZE": 4096}
+    with monkeypatch.context() as patch:
+        patch.setattr("os.sysconf", pages.get)
+        with pytest.raises(InputError, match=r"^9000 worlds of this task take about \d+ GB of mem"):
+            batch.from_pool(worlds.pool, 9000, "c")
+
+    def refuse(model: Any) -> Any:
+        raise mujoco.FatalError("Could not allocate memory")
+
+    simulator = Simulator(worlds.pool, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr(mujoco, "MjData", refuse)
+        with pytest.raises(
+            InputError, match="^world 1 of 3: no memory for 67 MB more of addresses"
+        ):
+            simulator._begin(1, 0)
+    simulator.close()
 
 
 def test_without_a_gpu_one_line_says_what_is_missing():

@@ -65,7 +65,7 @@ class Constants(NamedTuple):
       tcp_lead: How far ahead of the TCP they may be [m].
       max_opening: Of the hand [m].
       state: Which parts of MuJoCo's state are read.
-      warnings: Numbers of those that say that a simulation diverged.
+      diverged, full: Numbers of the warnings that say that a simulation diverged, or left out contacts or constraints.
       right_pad: The last of the robot's kinds of geoms, in `Tables.owners`.
       first: The first of what is owned there.
       fields: Where MuJoCo keeps its counts, contacts and warnings.
@@ -78,7 +78,8 @@ class Constants(NamedTuple):
     tcp_lead: float
     max_opening: float
     state: int
-    warnings: np.ndarray
+    diverged: np.ndarray
+    full: np.ndarray
     right_pad: int
     first: int
     fields: DataFields
@@ -135,7 +136,8 @@ class Seen(NamedTuple):
     """Worlds after a control step.
 
     Attributes:
-      states: Of MuJoCo, as `SimulationState.flat` has them, then zeros.
+      states: Of MuJoCo, as `SimulationState.flat` has them, then zeros; the last is 1 if anything was left out, now or
+        before.
       values, contacts: Of a `FlatMeasurement`.
       diverged: Whether MuJoCo warned of it.
     """
@@ -285,8 +287,18 @@ def put_back(constants: Constants, tables: Tables, world: int, states: Any) -> N
 
 
 @_compiled
+def _warns(fields: DataFields, data: Any, warnings: Any) -> bool:
+    """Whether MuJoCo has warned of any of these, by their numbers, since the data were last reset."""
+    for warning in warnings:
+        address = data + np.uintp(fields.warnings + warning * fields.warning_bytes)
+        if carray(_integers(address), 1)[0] > 0:
+            return True
+    return False
+
+
+@_compiled
 def _read(constants: Constants, tables: Tables, world: int, states: Any) -> None:
-    """A world's state, as `SimulationState.flat` has it; the rest is zero."""
+    """A world's state, as `SimulationState.flat` has it; the rest is zero but for what was left out in the last steps."""
     flat = states[world]
     model, data = tables.robots.models[world], tables.robots.datas[world]
     _get_state(model, data, flat.ctypes.data, np.int32(constants.state))
@@ -303,6 +315,8 @@ def _read(constants: Constants, tables: Tables, world: int, states: Any) -> None
         flat[place : place + count] = carray(_doubles(tables.real[world, k]), count)
         place += count
     flat[place:] = 0
+    if _warns(constants.fields, data, constants.full):
+        flat[-1] = 1
 
 
 @_compiled
@@ -320,11 +334,7 @@ def _measure(constants: Constants, tables: Tables, world: int, seen: Seen) -> No
         kind, slot = min(one, other), max(one, other)
         if kind <= constants.right_pad and slot >= constants.first:
             seen.contacts[world, kind, slot - constants.first] = True
-    seen.diverged[world] = False
-    for warning in constants.warnings:
-        address = data + np.uintp(fields.warnings + warning * fields.warning_bytes)
-        if carray(_integers(address), 1)[0] > 0:
-            seen.diverged[world] = True
+    seen.diverged[world] = _warns(fields, data, constants.diverged)
 
 
 @_compiled
@@ -356,7 +366,7 @@ def advance(
             return
         if _differ(states, kept, world):
             put_back(constants, tables, world, states)
-        robots = tables.robots
+        robots, full = tables.robots, states[world, -1]
         model, data = robots.models[world], robots.datas[world]
         for substep in range(targets.shape[1]):
             follow(constants, robots, world, targets[world, substep], room)
@@ -364,6 +374,7 @@ def advance(
             _step2(model, data)
             _step1(model, data)
         _read(constants, tables, world, seen.states)
+        seen.states[world, -1] = max(seen.states[world, -1], full)
         _measure(constants, tables, world, seen)
         kept[world] = seen.states[world]
 
