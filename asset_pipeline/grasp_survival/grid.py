@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.asset import GraspSet, StablePose
 from manipose_mj.assets.gripper import ParallelJaw
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, check_count
 from manipose_mj.poses import compose, invert, rotation_about
 
 
@@ -41,6 +41,7 @@ class GridConfig:
             raise InputError(f"frictions are {self.frictions}; expected one or more above 0")
         if self.places < 1 or self.shift < 0 or self.turn < 0:
             raise InputError("places: expected 1 or more; shift and turn: 0 or more")
+        check_count("seed", self.seed)
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,8 @@ def test_the_command_writes_the_file(asset, capsys):
 def test_wrong_input_is_one_line(tmp_path):
     with pytest.raises(InputError, match="expected one or more above 0"):
         GridConfig(frictions=(0.0,))
+    with pytest.raises(InputError, match="seed is -1; expected a whole number, at least 0"):
+        GridConfig(seed=-1)
     with pytest.raises(InputError, match="no such folder"):
         rigid_assets(tmp_path / "nothing")
 
