@@ -56,6 +56,13 @@ class PpoConfig:
     entropy_weight: float = 1e-3
     longest: float = 1.0
 
+    def require_worlds(self, count: int) -> None:
+        """Raises InputError where the actions of so many worlds in an update are fewer than its minibatches."""
+        if count * self.steps < self.minibatches:
+            raise InputError(
+                f"{count} worlds are too few for {self.minibatches} minibatches of {self.steps} actions each"
+            )
+
 
 class Learner(NamedTuple):
     """All that a training goes on from.
@@ -141,11 +148,7 @@ class Ppo:
           InputError: The worlds' actions in an update are fewer than its minibatches.
         """
         self.config = config or PpoConfig()
-        if worlds.count * self.config.steps < self.config.minibatches:
-            raise InputError(
-                f"{worlds.count} worlds are too few for {self.config.minibatches} minibatches of "
-                f"{self.config.steps} actions each"
-            )
+        self.config.require_worlds(worlds.count)
         self._worlds, self._features, self._command = worlds, features, command
         self._actions = actions
         self._optimiser = optax.chain(

@@ -16,7 +16,7 @@ import numpy as np
 
 from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.making import EngineName, available_engine, from_pool
-from manipose_mj.batch.starts import StartPool
+from manipose_mj.batch.starts import Layout, StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.learning import grip
 from manipose_mj.learning.frames import FRAMES, frame_of
@@ -72,12 +72,16 @@ class TrainingConfig:
 def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool:
     """The starts, read from a file if it is there, otherwise drawn and written to it.
 
+    One start is drawn first: what cannot be trained is refused before the others are drawn.
+
     Raises:
-      InputError: The task is none that can be trained, an episode is shorter than an action, or the file is of another
-        task.
+      InputError: The task is none that can be trained, the worlds are too few, an episode is shorter than an action, the
+        policy to go on from is none or about something else, or the file is of another task.
     """
+    config.ppo.require_worlds(config.worlds)
     if path is not None and path.exists():
         pool = StartPool.load(path)
+        horizon = _checked_horizon(config, pool.layout, path)
     else:
         env_config = EnvConfig(
             config.task,
@@ -86,25 +90,53 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
             reward_mode="dense",
             objects=config.objects,
         )
-        last = config.first_start + config.starts
-        pool = draw_pool(env_config, range(config.first_start, last))
+        seeds = range(config.first_start, config.first_start + config.starts)
+        pool = draw_pool(env_config, seeds[:1])
+        horizon = _checked_horizon(config, pool.layout, path)
+        if len(seeds) > 1:
+            pool = draw_pool(env_config, seeds)
         if path is not None:
             pool.save(path)
-    layout = pool.layout
+    return replace(pool, layout=replace(pool.layout, horizon=horizon))
+
+
+def _checked_horizon(config: TrainingConfig, layout: Layout, path: Path | None) -> int:
+    """Control steps in an episode of a training, once all has been checked that does not need every start.
+
+    Raises:
+      InputError: The layout or the policy to go on from does not fit the training, or an episode is shorter than an
+        action; `path` names the starts.
+    """
     modes = (grip.OBS_MODE, grip.CONTROL_MODE, "dense")
     if (layout.obs_mode, layout.control_mode, layout.reward_mode) != modes or (
         layout.task != config.task
     ):
         raise InputError(f"{path}: its starts are of another task or mode; draw them again")
-    frame_of(config.task, layout.frames)
-    # Episodes are shorter than the task's.
+    _policy_before(config, frame_of(config.task, layout.frames))
     control_timestep = layout.timestep * layout.substeps
     steps = round(config.episode / control_timestep)
     if steps < config.ppo.hold:
         raise InputError(
             f"episode is {config.episode:g} s; expected the time of an action at least, {config.ppo.hold * control_timestep:g} s"
         )
-    return replace(pool, layout=replace(layout, horizon=min(steps, layout.horizon)))
+    return min(steps, layout.horizon)
+
+
+def _policy_before(config: TrainingConfig, frame: str) -> Trained | None:
+    """The policy to go on from, if there shall be one.
+
+    Raises:
+      InputError: It is none, or was trained in another frame than this one.
+    """
+    if config.policy is None:
+        return None
+    before = Trained.load(config.policy)
+    if before.frame != frame:
+        raise InputError(
+            f"{config.policy}: was trained on {before.task}, about {FRAMES[before.frame].NEEDS}; {config.task} takes "
+            f"a policy about {FRAMES[frame].NEEDS}"
+        )
+    return before
 
 
 def check_folder(out: Path, policy: Path | None = None) -> None:
@@ -151,13 +183,8 @@ def train(
       InputError: The engine cannot run here, the updates need more worlds, or the policy to go on from is none, or another task's.
     """
     ppo = config.ppo
-    before = None if config.policy is None else Trained.load(config.policy)
     name = frame_of(config.task, pool.layout.frames)
-    if before is not None and before.frame != name:
-        raise InputError(
-            f"{config.policy}: was trained on {before.task}, about {FRAMES[before.frame].NEEDS}; {config.task} takes "
-            f"a policy about {FRAMES[name].NEEDS}"
-        )
+    before = _policy_before(config, name)
     started = time.monotonic()
     worlds = from_pool(pool, config.worlds, available_engine(config.engine))
     frame = FRAMES[name]

@@ -11,14 +11,18 @@ import equinox as eqx
 import jax
 import pytest
 
+from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
-from manipose_mj.learning import trained
+from manipose_mj.learning import trained, training
 from manipose_mj.learning.frames import frame_of
+from manipose_mj.learning.ppo import PpoConfig
 from manipose_mj.learning.trained import Trained
 from manipose_mj.learning.training import POLICY_FILE, TrainingConfig, check_folder, training_pool
+from tests.few_objects import few
 from tests.places import ROOT
 
+WEIGHTS = Path(trained.__file__).parent / "weights"
 TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
 
 
@@ -34,6 +38,31 @@ def test_starts_are_kept_in_a_file_with_shorter_episodes(tmp_path):
     brief = TrainingConfig(TASK, starts=2, objects=PIECES, episode=0.1)
     with pytest.raises(InputError, match=r"episode is 0.1 s; .* 0.2 s"):
         training_pool(brief, tmp_path / "starts")
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "message"),
+    [
+        ("articulated/store_middle_drawer", {}, "has no grip frame to learn in"),
+        (TASK, {"episode": 0.1}, r"episode is 0.1 s; .* 0.2 s"),
+        (TASK, {"ppo": PpoConfig(minibatches=99)}, "2 worlds are too few for 99 minibatches"),
+        (TASK, {"policy": Path("nowhere.npz")}, "nowhere.npz: no trained policy"),
+        (TASK, {"policy": WEIGHTS / "lift.npz"}, "was trained on example/lift, about"),
+    ],
+)
+def test_what_cannot_be_trained_is_refused_before_the_starts_are_drawn(
+    task, options, message, tmp_path, monkeypatch
+):
+    def draw(config, seeds):
+        assert len(seeds) == 1
+        return draw_pool(config, seeds)
+
+    monkeypatch.setattr(training, "draw_pool", draw)
+    kept = tmp_path / "starts"
+    config = TrainingConfig(task, worlds=2, starts=9, objects=few(task), **options)
+    with pytest.raises(InputError, match=message):
+        training_pool(config, kept)
+    assert not kept.exists()
 
 
 def test_tasks_with_an_object_and_a_handle_are_refused():
@@ -76,7 +105,7 @@ def test_bad_numbers_end_in_one_line(capsys):
 
 
 def test_a_policy_about_something_else_is_no_beginning(tmp_path, capsys):
-    shipped = str(Path(trained.__file__).parent / "weights" / "open_middle_drawer.npz")
+    shipped = str(WEIGHTS / "open_middle_drawer.npz")
     words = [
         "single_object/target_pose",
         "--engine",
@@ -90,8 +119,7 @@ def test_a_policy_about_something_else_is_no_beginning(tmp_path, capsys):
     ]
     out = ["--out", str(tmp_path / "ppo")]
     assert main(["train", "ppo", *words, *out, "--policy", shipped]) == EXIT_INPUT
-    *_, note, said = capsys.readouterr().err.splitlines()
-    assert "the policy does not see where the object shall go" in note
+    (said,) = capsys.readouterr().err.splitlines()
     assert "about a task that opens or shuts one drawer or door" in said and "one object" in said
 
 
