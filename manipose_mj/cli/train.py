@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from manipose_mj.console.process import compile_at_once_on_gpus, one_thread_per_process
+from manipose_mj.console.process import CORES, compile_at_once_on_gpus, prepare_workers
 from manipose_mj.errors import InputError
 
 
@@ -32,6 +32,7 @@ def train_ppo(
     until: Annotated[float | None, arg(metavar="SHARE", help_behavior_hint="")] = None,
     episode: Annotated[float, arg(metavar="SECONDS")] = 12.0,
     engine: Literal["auto", "c", "warp"] = "auto",
+    jobs: int = CORES,
     objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
     pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     policy: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
@@ -51,11 +52,12 @@ def train_ppo(
       until: Stop once this share of the episodes succeed, with the noise of exploration.
       episode: Length of an episode in training.
       engine: warp, on a GPU; c, on the CPU, far slower; auto, the former where it runs.
+      jobs: Threads of the engine c; what is learnt does not depend on them.
       objects: Instead of the built-in ones for training: names, asset folders, or folders of them.
       pool: File with the starts: read if it is there, otherwise written.
       policy: The policy.npz of a training, from which this one goes on.
     """
-    one_thread_per_process()
+    prepare_workers(jobs)
     compile_at_once_on_gpus()
     numbers = {"worlds": worlds, "starts": starts, "minutes": minutes, "updates": updates}
     for name, value in numbers.items():
@@ -88,6 +90,7 @@ def train_ppo(
         until=until,
         episode=episode,
         engine=available_engine(engine),
+        threads=jobs,
         objects=objects or None,
         policy=policy,
     )

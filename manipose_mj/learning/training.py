@@ -49,6 +49,7 @@ class TrainingConfig:
       until: Share of the episodes that succeed at their end with which the training stops; None: never.
       episode: Length of an episode [s], shorter than the task's.
       engine: Of the physics.
+      threads: Of the engine `c`; nothing that is learnt depends on them.
       objects: Furniture; None: the built-in pieces for training.
       policy: A trained one to go on from, whose actor and normalisation are kept; None: from nothing.
       ppo: How to learn.
@@ -64,6 +65,7 @@ class TrainingConfig:
     until: float | None = None
     episode: float = 12.0
     engine: EngineName = "auto"
+    threads: int = 1
     objects: Objects | None = None
     policy: Path | None = None
     ppo: PpoConfig = PpoConfig()
@@ -186,7 +188,7 @@ def train(
     name = frame_of(config.task, pool.layout.frames)
     before = _policy_before(config, name)
     started = time.monotonic()
-    worlds = from_pool(pool, config.worlds, available_engine(config.engine))
+    worlds = from_pool(pool, config.worlds, available_engine(config.engine), threads=config.threads)
     frame = FRAMES[name]
     learning = Ppo(worlds, frame.features, frame.command, grip.ACTIONS, ppo)
     learner = learning.begin(jax.random.key(config.seed))

@@ -123,6 +123,24 @@ def test_a_policy_about_something_else_is_no_beginning(tmp_path, capsys):
     assert "about a task that opens or shuts one drawer or door" in said and "one object" in said
 
 
+def test_the_engine_has_as_many_threads_as_there_are_jobs(tmp_path, monkeypatch, capsys):
+    seen = {}
+
+    def made(pool, worlds, engine, *, threads):
+        seen.update(worlds=worlds, engine=engine, threads=threads)
+        raise InputError("enough")
+
+    monkeypatch.setattr(training, "from_pool", made)
+    words = ["--engine", "c", "--worlds", "2", "--starts", "1", "--objects", "box_000"]
+    words += ["--out", str(tmp_path / "ppo"), "--jobs", "3"]
+    assert main(["train", "ppo", "single_object/target_pose", *words]) == EXIT_INPUT
+    assert seen == {"worlds": 2, "engine": "c", "threads": 3}
+    note, _ = capsys.readouterr().err.splitlines()
+    assert "the policy does not see where the object shall go" in note
+    assert main(["train", "ppo", TASK, "--jobs", "0"]) == EXIT_INPUT
+    assert "jobs is 0; expected at least 1" in capsys.readouterr().err
+
+
 @pytest.mark.full
 def test_a_training_leaves_a_policy_that_evaluate_plays(tmp_path, capsys):
     words = [
