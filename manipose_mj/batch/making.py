@@ -51,7 +51,7 @@ def make(
       visual: Keep the visual shapes of objects in the engine `warp`, for `Cameras`; it costs speed.
       capacity: Room of the engine `warp` for contacts and constraints; without it, from a probe of the starts.
       **config: Fields of `EnvConfig`: `obs_mode` (`state`, `pose`, or keys of these), `control_mode`, `reward_mode`,
-        `objects`, `split`, `randomisation`, `sensors`, `latency`.
+        `objects` (or `"train"`, `"test"`, as `split`), `split`, `randomisation`, `sensors`, `latency`.
 
     Raises:
       InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.

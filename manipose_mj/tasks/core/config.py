@@ -13,7 +13,7 @@ from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
 from manipose_mj.errors import InputError, unknown_name
-from manipose_mj.tasks.core.object_selection import select_assets
+from manipose_mj.tasks.core.object_selection import is_folder, select_assets
 from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.randomisation import STRENGTHS
 from manipose_mj.tasks.goals import RewardMode, Tolerance
@@ -118,16 +118,23 @@ def env_config(task: str, options: EnvOptions) -> EnvConfig:
 
     Args:
       task: `"domain/name"`.
-      options: Fields of `EnvConfig`.
+      options: Fields of `EnvConfig`; `objects` may name a split instead, unless there is a folder of that name.
 
     Raises:
-      InputError: The task is no name, or a field is unknown or holds what it cannot.
+      InputError: The task is no name, a field is unknown or holds what it cannot, or `objects` and `split` name different
+        splits.
     """
     if not isinstance(task, str):
         raise InputError(f'task is {task!r}; expected "domain/name"')
     for name in options:
         if name not in EnvOptions.__annotations__:
             raise unknown_name("option", name, EnvOptions.__annotations__)
+    chosen: Any = options.get("objects")
+    if isinstance(chosen, str) and chosen in SPLITS and not is_folder(chosen):
+        split = options.get("split", chosen)
+        if split != chosen:
+            raise InputError(f"objects is {chosen!r} and split is {split!r}; expected one of them")
+        options = {**options, "objects": None, "split": chosen}
     return EnvConfig(task, **options)
 
 

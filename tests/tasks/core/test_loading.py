@@ -13,7 +13,9 @@ from dm_control.suite.wrappers import action_noise
 import manipose_mj
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
+from manipose_mj.assets.categories import SPLITS
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig, env_config
 from manipose_mj.tasks.observations.sensors import CameraView, SensorConfig
 from tests.few_objects import few, load
 from tests.tasks.episode_driver import HOLD
@@ -150,6 +152,18 @@ def test_options_of_other_kinds_are_one_line(options, said):
     with pytest.raises(InputError, match=said) as caught:
         suite.load("single_object", "target_pose", **options)
     assert "\n" not in str(caught.value)
+
+
+def test_objects_may_name_a_split(tmp_path, monkeypatch):
+    task = "single_object/target_pose"
+    for split in SPLITS:
+        assert env_config(task, {"objects": split}) == EnvConfig(task, split=split)
+        assert env_config(task, {"objects": split, "split": split}) == EnvConfig(task, split=split)
+    with pytest.raises(InputError, match=r"objects is 'test' and split is 'train'; expected one"):
+        env_config(task, {"objects": "test", "split": "train"})
+    (tmp_path / "test").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert env_config(task, {"objects": "test"}).objects == ("test",)
 
 
 def test_two_assets_of_one_name_are_refused(tmp_path):
