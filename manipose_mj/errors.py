@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 _AT_MOST = 60  # names that an error spells out
+_MOST = 60  # letters of a value that it shows
 
 
 class InputError(ValueError):
@@ -22,6 +23,12 @@ class RecordError(InputError):
 
 class ServerAbsentError(InputError):
     """Nobody answers at the address of a method's server, or somebody else does."""
+
+
+def brief(value: object) -> str:
+    """What a value looks like, in one short line for messages."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _MOST else f"{text[:_MOST]}..."
 
 
 def check_count(what: str, value: object, *, least: int = 0) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,8 +12,11 @@ from jaxtyping import Float, Int
 from manipose_mj.actions import Arm, Memory, PureTcpSolver, control_law
 from manipose_mj.batch.goals import stack_trees
 from manipose_mj.batch.starts import StartPool
+from manipose_mj.errors import InputError, brief
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.poses import Array
+
+_REAL = (jnp.floating, jnp.integer, jnp.bool_)
 
 
 class Commands(NamedTuple):
@@ -113,6 +116,40 @@ class Controller:
         late = self._longest - self._latency[rows][:, None] + jnp.arange(self._substeps)
         arriving = jnp.take_along_axis(sent, late[..., None], axis=1)
         return Commands(memory, sent[:, -self._longest :]), arriving
+
+
+def action_array(actions: Any, shape: tuple[int, int], *, recorded: bool = False) -> Any:
+    """The actions of a step as an array, traced or not.
+
+    Args:
+      actions: An array, or numbers in equal rows.
+      shape: That they shall have, `(worlds, n)`.
+      recorded: Whether they are of several steps, one after the other.
+
+    Raises:
+      InputError: They are no real numbers, or have another shape.
+    """
+    array = _array(actions)
+    if not any(jnp.issubdtype(array.dtype, kind) for kind in _REAL):
+        found = f"of type {array.dtype}" if array is actions else brief(actions)
+        raise InputError(f"the actions of a step are {found}; expected real numbers")
+    found = array.shape[1:] if recorded else array.shape
+    if found != shape:
+        raise InputError(f"the actions of a step have shape {found}; expected {shape}")
+    return array
+
+
+def _array(actions: Any) -> Any:
+    if isinstance(actions, np.ndarray | jax.Array):
+        return actions
+    try:
+        return np.asarray(actions)
+    except jax.errors.TracerArrayConversionError:
+        return jnp.asarray(actions)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the actions of a step are {brief(actions)}; expected numbers in equal rows"
+        ) from None
 
 
 def _single(memory: Memory) -> Memory:

@@ -87,6 +87,25 @@ class Transition(NamedTuple):
         return cls(action, *(getattr(after, name) for name in cls._fields[1:]))
 
 
+def check_state(state: Any, count: int) -> None:
+    """See that worlds can go on from a state; arrays may be traced.
+
+    Args:
+      state: What is taken for one.
+      count: How many worlds there are.
+
+    Raises:
+      InputError: It is none, or of more or fewer worlds.
+    """
+    if not isinstance(state, State):
+        raise InputError(
+            f"state is a {type(state).__name__}; expected a State, such as worlds.reset returns"
+        )
+    if jnp.shape(state.row) != (count,):
+        worlds = " x ".join(map(str, jnp.shape(state.row))) or "one"
+        raise InputError(f"the state is of {worlds} worlds; expected one of {count}")
+
+
 def write_state(path: Path, identity: dict[str, np.ndarray], state: State) -> None:
     """Write a state to a file (`.npz`), with what its worlds are known by."""
     leaves: dict[str, Any] = {

@@ -11,14 +11,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
-from manipose_mj.batch.commands import Controller
+from manipose_mj.batch.commands import Controller, action_array
 from manipose_mj.batch.engine import Engine
 from manipose_mj.batch.goals import EpisodeGoals, stack_trees, take
 from manipose_mj.batch.measurement import Measurement, scene_state
 from manipose_mj.batch.observations import Observation, Observer
 from manipose_mj.batch.starts import StartPool
-from manipose_mj.batch.state import State, Transition, read_state, write_state
-from manipose_mj.errors import InputError, check_count
+from manipose_mj.batch.state import (
+    State,
+    Transition,
+    check_state,
+    read_state,
+    write_state,
+)
+from manipose_mj.errors import InputError, brief, check_count
 from manipose_mj.poses import Array
 from manipose_mj.tasks.core.config import check_seed
 from manipose_mj.tasks.core.task import CONTROL_TIMESTEP, SUCCESS_HELD
@@ -65,8 +71,13 @@ class Worlds:
         )
 
     def reset(self, key: PRNGKeyArray) -> State:
-        """Begin an episode in every world, each start of the pool equally often."""
+        """Begin an episode in every world, each start of the pool equally often.
+
+        Raises:
+          InputError: The key is none, or several; or the worlds were closed.
+        """
         self._require_open()
+        _check_key(key)
         rows = jax.random.permutation(key, len(self.pool.starts))
         return self._begin_jit(jnp.resize(rows, (self.count,)))
 
@@ -103,14 +114,13 @@ class Worlds:
             fewer actions a second; no longer than to the horizon. The reward is the last one's.
 
         Raises:
-          InputError: Actions are no numbers or have another shape, `hold` is no positive whole number, or the worlds
-            were closed.
+          InputError: The state is none or of other worlds, actions are no numbers or have another shape, `hold` is no
+            positive whole number, or the worlds were closed.
         """
         self._require_open()
         check_count("hold", hold, least=1)
-        action = action if hasattr(action, "shape") else np.asarray(action)
-        self.check_actions(action)
-        return self._step_jit(state, action, hold)
+        check_state(state, self.count)
+        return self._step_jit(state, self.checked_actions(action), hold)
 
     def rollout(
         self,
@@ -131,29 +141,28 @@ class Worlds:
           key: For the policy.
 
         Raises:
-          InputError: A policy is given without `steps`, there are fewer actions, or they have another shape; steps is no
-            whole number, or key no key.
+          InputError: A policy is given without `steps`, there are fewer actions, they are no numbers or have another
+            shape; the state is none or of other worlds; steps is no whole number, or key no key.
         """
         self._require_open()
         if steps is not None:
             check_count("steps", steps)
-        if key is not None and not hasattr(key, "dtype"):
-            raise InputError(f"key is {key!r}; expected a key such as jax.random.key(0)")
+        if key is not None:
+            _check_key(key)
+        check_state(state, self.count)
         if callable(policy):
             if steps is None:
                 raise InputError("a rollout of a policy needs the number of steps")
             keys = jax.random.split(jax.random.key(0) if key is None else key, steps)
 
             def act_and_step(state: State, own: Array) -> tuple[State, Transition]:
-                action: Any = policy(state.observation, own)
-                self.check_actions(action)
+                action = self.checked_actions(policy(state.observation, own))
                 after = self._step_jit(state, action, 1)
                 return after, Transition.of(action, after)
 
             return jax.lax.scan(act_and_step, state, keys)
 
-        recorded = jnp.asarray(policy)
-        self.check_actions(recorded, recorded.shape[1:])
+        recorded = jnp.asarray(self.checked_actions(policy, recorded=True))
         if steps is not None and steps > len(recorded):
             raise InputError(f"steps is {steps}; the recording has {len(recorded)} actions")
         # Nobody looks before the last step.
@@ -166,7 +175,12 @@ class Worlds:
         return np.asarray(self.pool.seeds)[np.asarray(state.row)]
 
     def save(self, state: State, path: Path | str) -> None:
-        """Write a state to a file (`.npz`)."""
+        """Write a state to a file (`.npz`).
+
+        Raises:
+          InputError: It is none, or of other worlds.
+        """
+        check_state(state, self.count)
         write_state(Path(path), self._identity(), state)
 
     def restore(self, path: Path | str) -> State:
@@ -183,14 +197,13 @@ class Worlds:
         self._closed = True
         self.engine.close()
 
-    def check_actions(self, actions: Any, shape: tuple[int, ...] | None = None) -> None:
-        """Raises InputError where actions are complex or not one a world; `shape` is that of one step's, if they are more."""
-        shape = jnp.shape(actions) if shape is None else shape
-        expected = (self.count, len(self.lower))
-        if shape != expected:
-            raise InputError(f"the actions of a step have shape {shape}; expected {expected}")
-        if jnp.iscomplexobj(actions):
-            raise InputError("the actions of a step are complex; expected real numbers")
+    def checked_actions(self, actions: Any, *, recorded: bool = False) -> Any:
+        """The actions of a step, or those of several that are `recorded`, as an array.
+
+        Raises:
+          InputError: They are no real numbers, or not one action a world.
+        """
+        return action_array(actions, (self.count, len(self.lower)), recorded=recorded)
 
     def _require_open(self) -> None:
         if self._closed:
@@ -319,6 +332,29 @@ class Worlds:
             held_at=jnp.where(held_now, count, state.held_at),
             simulation=simulation,
             measurement=now,
+        )
+
+
+def keys_shape(keys: Any) -> tuple[int, ...]:
+    """The shape of an array of keys, of either kind that JAX has; of one key, ().
+
+    Raises:
+      InputError: They are no keys.
+    """
+    try:
+        typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
+        return np.shape(keys if typed else jax.random.wrap_key_data(keys))
+    except (AttributeError, TypeError):
+        raise InputError(
+            f"key is {brief(keys)}; expected a key such as jax.random.key(0)"
+        ) from None
+
+
+def _check_key(key: Any) -> None:
+    shape = keys_shape(key)
+    if shape:
+        raise InputError(
+            f"key is an array of {shape} keys; expected one, such as jax.random.key(0)"
         )
 
 

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float, Int
 
 from manipose_mj.batch.observations import Observation
 from manipose_mj.batch.state import State
-from manipose_mj.batch.worlds import Worlds
+from manipose_mj.batch.worlds import Worlds, keys_shape
 from manipose_mj.errors import InputError
 from manipose_mj.poses import Array
 
@@ -78,11 +77,7 @@ class BraxWorlds:
         Raises:
           InputError: There are neither one key nor as many as worlds.
         """
-        typed = hasattr(rng, "dtype") and jnp.issubdtype(rng.dtype, jax.dtypes.prng_key)
-        shape = np.shape(rng)
-        if not typed and (shape[-1:] != (2,) or rng.dtype != jnp.uint32):
-            raise InputError(f"{rng!r} is no key; expected jax.random.key(0), or one a world")
-        keys = shape if typed else shape[:-1]
+        keys = keys_shape(rng)
         if keys not in ((), (self.worlds.count,)):
             raise InputError(
                 f"keys of shape {keys} for {self.worlds.count} worlds; expected one, or one a world"
@@ -96,7 +91,7 @@ class BraxWorlds:
         Raises:
           InputError: The actions have another shape.
         """
-        self.worlds.check_actions(action)
+        action = self.worlds.checked_actions(action)
         low, high = self.worlds.lower, self.worlds.upper
         bounded = jnp.clip(action, -1.0, 1.0)
         after = self.worlds.step(state.data, low + (bounded + 1) / 2 * (high - low))

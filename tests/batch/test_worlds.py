@@ -201,7 +201,7 @@ def test_closed_worlds_say_so(worlds, threads):
 @pytest.mark.usefixtures("wrong_arrays")
 def test_what_can_be_no_step_is_refused(worlds):
     state, action = worlds.at(jnp.array([7, 8, 7])), wandering(1, 3)[0]
-    with pytest.raises(InputError, match="actions of a step are complex"):
+    with pytest.raises(InputError, match="actions of a step are of type complex"):
         worlds.step(state, action + 0j)
     with pytest.raises(InputError, match=r"steps is 2.5; expected a whole number"):
         worlds.rollout(lambda observation, key: action, state, cast(Any, 2.5))

@@ -59,7 +59,7 @@ def test_keys_are_one_or_one_a_world(env):
     with pytest.raises(InputError, match=r"keys of shape \(3,\) for 2 worlds"):
         env.reset(jax.random.split(jax.random.key(0), 3))
     for number in (0, np.int32(0)):
-        with pytest.raises(InputError, match=r"is no key; expected jax.random.key"):
+        with pytest.raises(InputError, match=r"key is .*; expected a key such as jax.random.key"):
             env.reset(number)
     with pytest.raises(InputError, match=r"have shape \(2, 3\); expected \(2, "):
         env.step(env.reset(raw), jnp.zeros((2, 3)))

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from manipose_mj.batch.starts import RowModels
-from manipose_mj.batch.state import State
+from manipose_mj.batch.state import State, check_state
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.mjcf.cameras.ray_camera import camera_intrinsics
@@ -103,6 +103,7 @@ class Cameras:
 
     def _look(self, state: State) -> Images:
         """What they see now; a pure function of the state, jitted as `look`."""
+        check_state(state, self._shape[0])
         rows = state.row
         depth, geoms, rgb = self._render(state.simulation, rows)
         depth, geoms = depth.reshape(self._shape), geoms.reshape(self._shape)
