@@ -67,7 +67,7 @@ def compare(pool: StartPool, count: int, threads: int) -> None:
         action = _action(state, yaw, step)
         after = reference.step(state, action)
         if step in MOMENTS:
-            same = state._replace(simulation=_simulations(pool, state))
+            same = state._replace(simulation=_simulations(pool, state), identity=other.identity)
             found = other.step(same, action)
             for name, values in _differences(after, found).items():
                 rows.setdefault(name, []).append(values)

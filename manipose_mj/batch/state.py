@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,9 +17,32 @@ from manipose_mj.batch.commands import Commands
 from manipose_mj.batch.engine import Physics
 from manipose_mj.batch.measurement import Measurement
 from manipose_mj.batch.observations import Observation
+from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
 from manipose_mj.poses import Array
 from manipose_mj.storage.cache_file import new_cache_file
+
+
+@jax.tree_util.register_static  # no array: part of the structure of a state
+@dataclass(frozen=True)
+class Identity:
+    """By what a state knows its worlds: equal for worlds of one pool on one engine.
+
+    Attributes:
+      task: `"domain/name"`.
+      engine: As users write it.
+      digest: Of the options and starts.
+    """
+
+    task: str
+    engine: str
+    digest: str
+
+    @classmethod
+    def of(cls, pool: StartPool, engine: str) -> Identity:
+        """That of worlds of a pool on an engine."""
+        known = repr((pool.layout, pool.seeds, pool.digest)).encode()
+        return cls(pool.layout.task, engine, hashlib.sha256(known).hexdigest())
 
 
 class State(NamedTuple):
@@ -45,6 +70,7 @@ class State(NamedTuple):
       simulation: The engine's.
       measurement: Of it.
       commands: What the controllers remember.
+      identity: Of the worlds that can step it.
     """
 
     observation: Observation
@@ -63,6 +89,7 @@ class State(NamedTuple):
     simulation: Physics
     measurement: Measurement
     commands: Commands
+    identity: Identity
 
     @property
     def done(self) -> Bool[Array, " worlds"]:
@@ -87,20 +114,27 @@ class Transition(NamedTuple):
         return cls(action, *(getattr(after, name) for name in cls._fields[1:]))
 
 
-def check_state(state: Any, count: int) -> None:
+def check_state(state: Any, identity: Identity, count: int) -> None:
     """See that worlds can go on from a state; arrays may be traced.
 
     Args:
       state: What is taken for one.
-      count: How many worlds there are.
+      identity: Of the worlds.
+      count: How many they are.
 
     Raises:
-      InputError: It is none, or of more or fewer worlds.
+      InputError: It is none, or of other worlds.
     """
     if not isinstance(state, State):
         raise InputError(
             f"state is a {type(state).__name__}; expected a State, such as worlds.reset returns"
         )
+    known = state.identity
+    if known != identity:
+        whose, own = (f"{each.task} on engine {each.engine!r}" for each in (known, identity))
+        if whose == own:
+            whose, own = f"{own} with other starts or options", "these worlds' own"
+        raise InputError(f"the state is of other worlds: of {whose}; expected {own}")
     if jnp.shape(state.row) != (count,):
         worlds = " x ".join(map(str, jnp.shape(state.row))) or "one"
         raise InputError(f"the state is of {worlds} worlds; expected one of {count}")

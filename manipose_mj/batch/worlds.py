@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from manipose_mj.batch.measurement import Measurement, scene_state
 from manipose_mj.batch.observations import Observation, Observer
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.state import (
+    Identity,
     State,
     Transition,
     check_state,
@@ -70,6 +72,11 @@ class Worlds:
             jax.jit(step, static_argnums=2) for step in (self._step, self._unseen_step)
         )
 
+    @cached_property
+    def identity(self) -> Identity:
+        """What their states carry; equal for worlds of the same pool on the same engine."""
+        return Identity.of(self.pool, self.engine.name)
+
     def reset(self, key: PRNGKeyArray) -> State:
         """Begin an episode in every world, each start of the pool equally often.
 
@@ -119,7 +126,7 @@ class Worlds:
         """
         self._require_open()
         check_count("hold", hold, least=1)
-        check_state(state, self.count)
+        check_state(state, self.identity, self.count)
         return self._step_jit(state, self.checked_actions(action), hold)
 
     def rollout(
@@ -149,7 +156,7 @@ class Worlds:
             check_count("steps", steps)
         if key is not None:
             _check_key(key)
-        check_state(state, self.count)
+        check_state(state, self.identity, self.count)
         if callable(policy):
             if steps is None:
                 raise InputError("a rollout of a policy needs the number of steps")
@@ -180,8 +187,8 @@ class Worlds:
         Raises:
           InputError: It is none, or of other worlds.
         """
-        check_state(state, self.count)
-        write_state(Path(path), self._identity(), state)
+        check_state(state, self.identity, self.count)
+        write_state(Path(path), self._in_file(), state)
 
     def restore(self, path: Path | str) -> State:
         """The state that was saved, by worlds of the same task, options, starts and number.
@@ -190,7 +197,7 @@ class Worlds:
           InputError: There is none, or it is of other worlds.
         """
         shapes = jax.eval_shape(self._begin, jnp.zeros(self.count, jnp.int32))
-        return read_state(path, self._identity(), shapes)
+        return read_state(path, self._in_file(), shapes)
 
     def close(self) -> None:
         """Free what the engine holds; nothing can be stepped afterwards."""
@@ -209,7 +216,8 @@ class Worlds:
         if self._closed:
             raise InputError("these worlds were closed; make new ones")
 
-    def _identity(self) -> dict[str, Any]:
+    def _in_file(self) -> dict[str, Any]:
+        """The same as `identity`, and the number of worlds, in parts that can be told apart."""
         return {
             "options": np.array([repr(self.pool.layout), self.engine.name]),
             "seeds": np.array(self.pool.seeds),
@@ -243,6 +251,7 @@ class Worlds:
             simulation=take(self._simulations, rows),
             measurement=now,
             commands=self._controller.begin(rows, now.joints, now.fingers.sum(-1)),
+            identity=self.identity,
         )
 
     def _step(self, state: State, action: Float[Array, "worlds n"], hold: int) -> State:

@@ -1,7 +1,9 @@
-"""What batched worlds say to keys, actions and states that are none; also inside `jax.jit`."""
+"""What batched worlds say to keys, actions and states that are none, or of other worlds; also inside `jax.jit`."""
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import replace
 from typing import Any, cast
 
 import jax
@@ -107,3 +109,29 @@ def test_a_state_of_more_or_fewer_worlds_is_refused(worlds):
     refused(lambda: worlds.step(two, action), said)
     refused(lambda: worlds.rollout(action[None], two), said)
     refused(lambda: jax.jit(worlds.step)(two, action), said)
+
+
+def test_a_state_of_other_worlds_of_the_same_sizes_is_refused(worlds, state, tmp_path):
+    moved = [replace(each, simulation=each.simulation + 0.01) for each in worlds.pool.starts]
+    others = batch.from_pool(replace(worlds.pool, starts=tuple(moved)), 3, "c")
+    action, said = wandering(1, 3)[0], "the state is of other worlds: .* with other starts"
+    refused(lambda: others.step(state, action), said)
+    refused(lambda: others.rollout(action[None], state), said)
+    refused(lambda: jax.jit(others.step)(state, action), said)
+    refused(lambda: others.save(state, tmp_path / "state"), said)
+    other = state._replace(identity=replace(state.identity, engine="warp"))
+    refused(lambda: worlds.step(other, action), "on engine 'warp'; expected .* on engine 'c'")
+
+
+def test_states_of_equal_worlds_share_what_is_compiled(worlds, state):
+    again = batch.from_pool(pickle.loads(pickle.dumps(worlds.pool)), 3, "c", threads=2)
+    traced = []
+
+    @jax.jit
+    def opening(state: batch.State) -> jax.Array:
+        traced.append(state)
+        return worlds.step(state, wandering(1, 3)[0]).measurement.openings
+
+    np.testing.assert_array_equal(opening(state), opening(again.at([7, 8, 7])))
+    assert len(traced) == 1
+    again.close()

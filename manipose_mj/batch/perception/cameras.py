@@ -74,6 +74,7 @@ class Cameras:
                 raise unknown_name("camera of these worlds", name, known)
         if not self.names or height < 1 or width < 1:
             raise InputError(f"{len(self.names)} cameras of {height} x {width} pixels see nothing")
+        self._whose = worlds.identity, worlds.count
         self._shape = (worlds.count, len(self.names), height, width)
         self._chosen = np.array([known.index(name) for name in self.names])
         self._render = worlds.engine.renderer(self.names, height, width, rgb)
@@ -103,7 +104,7 @@ class Cameras:
 
     def _look(self, state: State) -> Images:
         """What they see now; a pure function of the state, jitted as `look`."""
-        check_state(state, self._shape[0])
+        check_state(state, *self._whose)
         rows = state.row
         depth, geoms, rgb = self._render(state.simulation, rows)
         depth, geoms = depth.reshape(self._shape), geoms.reshape(self._shape)
