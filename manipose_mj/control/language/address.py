@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
+from manipose_mj.control.language.credentials import Credentials
 from manipose_mj.errors import InputError
 from manipose_mj.wire.address import without_secrets
 
@@ -44,7 +45,15 @@ def without_query(address: str) -> tuple[str, dict[str, str]]:
     return start, dict(parse_qsl(query, keep_blank_values=True))
 
 
-def secrets_in(address: str) -> list[str]:
-    """What `without_secrets` leaves out: the password and the query's values."""
-    password = urlsplit(address).password
-    return [*([password] if password else []), *without_query(address)[1].values()]
+def credentials_in(address: str, key: str = "") -> Credentials:
+    """What `without_secrets` leaves out, and a key: user, password and the query's values, as written and as sent."""
+    parts = urlsplit(address)
+    values = [each.partition("=")[2] for each in parts.query.split("&")]
+    secrets = [key, *values, *without_query(address)[1].values()]
+    pairs = []
+    if parts.username is not None:
+        written = (parts.username, parts.password or "")
+        user, password = (unquote(each) for each in written)
+        secrets += [*written, user, password]
+        pairs.append((user, password))
+    return Credentials(secrets, pairs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -10,13 +9,12 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
-from urllib.parse import quote
 
 from manipose_mj.control.language.address import (
     URL_VARIABLE,
     check_address,
+    credentials_in,
     no_address,
-    secrets_in,
     without_query,
 )
 from manipose_mj.control.language.completion import answer_in, complaint_in, one_line
@@ -27,7 +25,6 @@ KEY_VARIABLE = "OPENAI_API_KEY"
 _TIMEOUT = 60.0  # [s]
 _RETRIES = 3  # after 429, 5xx and lost connections; the client waits in between
 _WITH_WAITS = 1.25  # of the time of all tries, for what lies between them
-_SHORTEST_SECRET = 8  # characters; "none" and "EMPTY" are no keys, and words of plans are shorter
 # Of ways to ask for structured output, from the strictest on, that which an endpoint may have in the place of another.
 _FORMS = {"json_schema": "json_object", "json_object": None}
 _NAMES = {
@@ -88,7 +85,7 @@ class EndpointModel:
             "response_format": "json_schema",
         }
         self._errors = openai
-        self._secrets = _written_forms([key, *(secrets_in(base_url) if base_url else [])])
+        self._credentials = credentials_in(base_url or "", key)
         self._longest = _WITH_WAITS * timeout * (1 + retries)
         try:
             self._client = openai.OpenAI(
@@ -105,7 +102,7 @@ class EndpointModel:
         """An episode is as good as any other."""
 
     def answer(self, messages: list[Message], schema: dict[str, Any]) -> Answer:
-        """The model's reply, without the key.
+        """The model's reply, without key, user, password and query.
 
         Raises:
           NoReplyError: It did not answer, or declined in its own way.
@@ -114,8 +111,9 @@ class EndpointModel:
             answer = answer_in(self._body(messages, schema))
         except NoReplyError as failure:
             # Cut last: half of a key would not be found.
-            raise NoReplyError(one_line(self._without_secrets(str(failure)))) from None
-        return Answer(self._without_secrets(answer.text), answer.cut)
+            said = self._credentials.removed_from_error(str(failure))
+            raise NoReplyError(one_line(said)) from None
+        return Answer(self._credentials.removed_from_reply(answer.text), answer.cut)
 
     def _body(self, messages: list[Message], schema: dict[str, Any]) -> bytes:
         """The body of the answer to a question that is asked for less where an endpoint does not take all.
@@ -166,23 +164,6 @@ class EndpointModel:
                         self.parameters[name] = less
                     return True
         return False
-
-    def _without_secrets(self, text: str) -> str:
-        for secret in self._secrets:
-            text = text.replace(secret, "***")
-        return text
-
-
-def _written_forms(secrets: list[str]) -> list[str]:
-    """Secrets as they are, and as they stand in JSON and in addresses; the longest first."""
-    forms = {
-        form
-        for secret in secrets
-        if len(secret) >= _SHORTEST_SECRET
-        for quoted in [json.dumps(secret)[1:-1]]
-        for form in (secret, quoted, quoted.replace("/", "\\/"), quote(secret), quote(secret, ""))
-    }
-    return sorted(forms, key=len, reverse=True)
 
 
 def _within(ends: float, ask: Callable[[], bytes]) -> bytes:
