@@ -1,12 +1,14 @@
 """Print what evaluations of the baseline come to: by family, task, object type, source of grasps and planner.
 
-    python benchmarks/manipulation_table.py RUN...                     # tables of any evaluations
+    python benchmarks/manipulation_table.py RUN...                     # tables of evaluations with --protocol v1
     python benchmarks/manipulation_table.py --play 2 --out RUNS        # play two episodes of every task first
     python benchmarks/manipulation_table.py --strips docs/results/failures --page docs/results/protocol_v1.md \\
         --csv docs/plots/protocol_v1.csv                               # the page of the documentation
 
-A RUN is a folder that `manipose evaluate` wrote; by default those of the baseline's cards in `leaderboard/`.
-`--strips` draws each failure, which is played once more where it left no trajectory.
+A RUN is a folder that `manipose evaluate --protocol v1` wrote; by default those of the baseline's cards in `leaderboard/`.
+A column is a method: what it was told of objects, then what differs from the baseline's defaults, such as an estimator,
+a language model, errors made on purpose or a policy. `--strips` draws each failure from its trajectory; where the run
+left none, the episode is played once more.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from pictures.failure_strips import POSES, draw_strips, grasps_of, poses_of, strip_name
+from pictures.failure_strips import Run, draw_strips, strip_name
+from pictures.run_labels import check_labels, grasps_of, in_order, label_of, planner_of, poses_of
 from tyro.conf import Positional
 
 from manipose_mj.assets import categories
@@ -45,12 +48,16 @@ FAMILIES = {
     "take out": ("articulated/take_out_",),
     "clutter": ("clutter/",),
 }
+# What is always told; the others where they tell episodes apart.
+ALWAYS = ("family", "task")
+# Of these the columns differ in what was told of objects only.
+OF_METHODS = ("source of grasps", "planner")
 HEAD = Path(__file__).with_name("manipulation_page.md")
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Attributes: runs: folders; play: episodes of every task of protocol v1 to play first; out: where to; jobs; strips:
+    """Attributes: runs: folders that `manipose evaluate --protocol v1` wrote; play: episodes of every task of protocol v1 to play first; out: where to; jobs; strips:
     folder for pictures of failures; page, csv: files to write."""
 
     runs: Positional[tuple[Path, ...]] = ()
@@ -64,19 +71,20 @@ class Arguments:
 
 @dataclass(frozen=True)
 class Played:
-    """An episode and what its run says of it: `poses`, of `POSES`; `grasps`; `planner`."""
+    """An episode and what its run says of it: `label`, of its method; `poses`, told; `grasps`; `planner`."""
 
     result: EpisodeResult
+    label: str
     poses: str
     grasps: str
     planner: str
 
     @property
     def family(self) -> str:
-        """What the task is about."""
-        return next(
-            name for name, starts in FAMILIES.items() if self.result.task.startswith(starts)
-        )
+        """What the task is about; its domain, if that is none of `FAMILIES`."""
+        task = self.result.task
+        known = (name for name, starts in FAMILIES.items() if task.startswith(starts))
+        return next(known, task.partition("/")[0])
 
     @property
     def object_type(self) -> str:
@@ -99,15 +107,16 @@ GROUPS: dict[str, Callable[[Played], str]] = {
 
 def main(arguments: Arguments) -> None:
     """Play, read, draw, print, write: what was asked for."""
-    records = [read_run(folder) for folder in arguments.runs]
-    if arguments.play:
-        records += _played(arguments)
-    if not records:
-        records = baseline_records()
-    episodes = [each for record in records for each in episodes_of(record)]
+    folders = [*arguments.runs, *(_played(arguments) if arguments.play else ())]
+    strips = arguments.strips
+    if not folders:
+        folders = baseline_folders()
+        strips = strips or LEADERBOARD.parent / "docs" / "results" / "failures"
+    runs: list[Run] = [(folder, read_run(folder)) for folder in folders]
+    check_labels([record for _, record in runs])
+    episodes = [each for _, record in runs for each in episodes_of(record)]
     if arguments.strips is not None:
-        draw_strips(records, arguments.strips)
-    strips = arguments.strips or LEADERBOARD.parent / "docs" / "results" / "failures"
+        draw_strips(runs, arguments.strips)
     sys.stdout.write(tables(episodes))
     if arguments.page is not None:
         write_atomically(arguments.page, page(episodes, strips).encode("utf-8"))
@@ -115,36 +124,50 @@ def main(arguments: Arguments) -> None:
         write_atomically(arguments.csv, table_csv(episodes).encode("utf-8"))
 
 
+def baseline_folders() -> list[Path]:
+    """Folders of the runs that the page of the documentation is about."""
+    return [LEADERBOARD / card / "runs" / str(number) for card, number in RUNS]
+
+
 def baseline_records() -> list[RunRecord]:
-    """The runs that the page of the documentation is about."""
-    return [read_run(LEADERBOARD / card / "runs" / str(number)) for card, number in RUNS]
+    """Those runs."""
+    return [read_run(folder) for folder in baseline_folders()]
 
 
 def episodes_of(record: RunRecord) -> list[Played]:
     """The episodes of a run."""
     run = record.run
-    planner = (run.get("planner") or {}).get("kind", "rules")
-    return [Played(result, poses_of(run), grasps_of(run), planner) for result in record.results]
+    grasps = "policy" if run.get("policy") else grasps_of(run)
+    told = (label_of(run), poses_of(run), grasps, planner_of(run))
+    return [Played(result, *told) for result in record.results]
 
 
 def tables(episodes: Sequence[Played]) -> str:
-    """A table for each way to group them that tells any apart, Markdown."""
-    telling = [name for name, group in GROUPS.items() if len({group(e) for e in episodes}) > 1]
+    """A table for each way to group them that is of `ALWAYS` or tells any apart, Markdown."""
+    telling = [
+        name
+        for name, group in GROUPS.items()
+        if name in ALWAYS or len({group(e) for e in episodes}) > 1
+    ]
     return "\n".join(f"## By {name}\n\n{table(episodes, name)}" for name in telling)
 
 
 def table(episodes: Sequence[Played], by: str) -> str:
-    """Success and failures by what was told of objects, a row for each group."""
+    """Success and failures by method, a row for each group; by what methods differ in, two columns for each source of poses."""
     groups: dict[str, list[Played]] = {}
     for each in episodes:
         groups.setdefault(GROUPS[by](each), []).append(each)
-    order = list(FAMILIES) if by == "family" else sorted(groups)
-    shown = [poses for poses in POSES if any(each.poses == poses for each in episodes)]
-    titles = [f"{poses} | failures" for poses in shown]
+    order = [*(FAMILIES if by == "family" else ()), *sorted(groups)]
+
+    def column(each: Played) -> str:
+        return each.poses if by in OF_METHODS else each.label
+
+    shown = in_order([column(each) for each in episodes])
+    titles = [f"{name} | failures" for name in shown]
     lines = [f"| {by} | {' | '.join(titles)} |", "| --- |" + " --- |" * 2 * len(shown)]
-    for name in order:
+    for name in dict.fromkeys(order):
         if name in groups:
-            cells = [_cells([e for e in groups[name] if e.poses == poses]) for poses in shown]
+            cells = [_cells([e for e in groups[name] if column(e) == title]) for title in shown]
             lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -163,19 +186,19 @@ def _stages(results: Iterable[EpisodeResult]) -> str:
     return ", ".join(f"{counts[stage]} {stage}" for stage in STAGES if counts[stage]) or "-"
 
 
-def page(episodes: Sequence[Played], strips: Path) -> str:
-    """`docs/results/protocol_v1.md`: the tables, and every failure with its pictures."""
+def page(episodes: Sequence[Played], strips: Path | None) -> str:
+    """`docs/results/protocol_v1.md`: the tables, and every failure with its pictures if there are any."""
     lines = ["| task | start | object | poses | why |", "| --- | --- | --- | --- | --- |"]
     for each in episodes:
         result = each.result
         if result.failure is None:
             continue
         why = f"{result.failure}: {result.reason}"
-        picture = strip_name(result, each.poses)
-        if (strips / picture).is_file():
+        picture = strip_name(result, each.label)
+        if strips is not None and (strips / picture).is_file():
             why = f"[{result.failure}]({strips.name}/{picture}): {result.reason}"
         lines.append(
-            f"| `{result.task}` | {result.episode} | `{result.object}` | {each.poses} | {why} |"
+            f"| `{result.task}` | {result.episode} | `{result.object}` | {each.label} | {why} |"
         )
     head = HEAD.read_text(encoding="utf-8")
     return head.replace("<!-- tables -->\n", tables(episodes)).replace(
@@ -187,22 +210,24 @@ def table_csv(episodes: Iterable[Played]) -> str:
     """What `docs/plots/draw.py` draws."""
     groups: dict[tuple[str, str], list[EpisodeResult]] = {}
     for each in episodes:
-        groups.setdefault((each.poses, each.result.task), []).append(each.result)
+        groups.setdefault((each.label, each.result.task), []).append(each.result)
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(("poses", "task", "successes", "episodes", "failures", "deepest_contact_mm"))
     for (poses, task), results in groups.items():
         won, failures = sum(r.success_at_end for r in results), _stages(results)
-        deepest = 1000 * max(r.max_penetration for r in results)
+        # Batched worlds do not measure it.
+        depths = [r.max_penetration for r in results if r.max_penetration is not None]
+        deepest = f"{1000 * max(depths):.1f}" if depths else ""
         writer.writerow(
-            (poses, task, won, len(results), "" if failures == "-" else failures, f"{deepest:.1f}")
+            (poses, task, won, len(results), "" if failures == "-" else failures, deepest)
         )
     return stream.getvalue()
 
 
-def _played(arguments: Arguments) -> list[RunRecord]:
-    """Runs of every task with true and with estimated poses; what is there already is not played again."""
-    records = []
+def _played(arguments: Arguments) -> list[Path]:
+    """Folders of runs of every task with true and with estimated poses; what is there already is not played again."""
+    folders = []
     for pose in ("oracle", "estimated"):
         config = EvaluationConfig(
             tuple(protocol.load("v1").tasks),
@@ -213,8 +238,8 @@ def _played(arguments: Arguments) -> list[RunRecord]:
             protocol="v1",
         )
         evaluate(config, resume=True)
-        records.append(read_run(config.out))
-    return records
+        folders.append(config.out)
+    return folders
 
 
 if __name__ == "__main__":

@@ -111,7 +111,7 @@ def test_the_page_of_the_protocol_is_that_of_the_cards(manipulation):
     assert read(results / "protocol_v1.md") == manipulation.page(episodes, results / "failures")
     assert read(DOCS / "plots" / "protocol_v1.csv") == manipulation.table_csv(episodes)
     failed = {
-        manipulation.strip_name(each.result, each.poses)
+        manipulation.strip_name(each.result, each.label)
         for each in episodes
         if each.result.failure is not None
     }
