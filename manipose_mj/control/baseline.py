@@ -25,6 +25,7 @@ from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.control.planning.check import check_plan
 from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step, plan_to_json
 from manipose_mj.control.planning.plan_articulated import parts_to_look_behind, stand_wrong
+from manipose_mj.control.planning.plan_pieces import led_and_pushed, opened_by, until_a_look
 from manipose_mj.control.planning.planner import RulePlanner, TaskPlanner
 from manipose_mj.control.planning.rearrangement import is_supported
 from manipose_mj.control.planning.transport import lie_wrong
@@ -162,7 +163,8 @@ class Baseline:
         """
         self.status = ""
         scene, task = self._scene(), self._environment.task
-        scene.perception.reset(seed)
+        follows = self._planner.follows_goals
+        scene.perception.reset(seed, for_goals=follows)
         self._planner.begin(instruction(task))
         timestep = task.control_timestep
         executor = Executor(scene.perception, timestep)
@@ -196,8 +198,8 @@ class Baseline:
             planner = planner.allowing(allowance)
             acted = falls_short = False
             try:
-                steps = _until_a_look(plan) if looks > 0 else plan
-                for number, piece in enumerate(_led_and_pushed(steps) if looks > 0 else (steps,)):
+                steps = until_a_look(plan) if looks > 0 else plan
+                for number, piece in enumerate(led_and_pushed(steps) if looks > 0 else (steps,)):
                     if number and not scene.perception.unseen:
                         # What the hand led is measured before it is pushed on.
                         scene.perception.look_again()
@@ -208,13 +210,18 @@ class Baseline:
                     ):
                         acted = True
                         yield action
-                follows = self._planner.follows_goals
+                cut, unseen = len(steps) < len(plan), scene.perception.unseen
                 hidden = parts_to_look_behind(task.goals, estimate) if follows else ()
-                if len(steps) < len(plan) or (looks > 0 and hidden):
+                if unseen and not (follows or cut):
+                    hidden = opened_by(steps, estimate)
+                ends = not (step_by_step and plan)
+                if cut or (looks > 0 and hidden):
                     looks -= 1
                     yield from self._look_behind(hidden, planner, executor)
                     progress.made()
-                elif not (step_by_step and plan):
+                    # What was asked for besides goals may be about what shows now; else nothing is left to plan.
+                    ends = not (follows or cut or scene.perception.unseen < unseen)
+                if ends:
                     self.status = "done"
                     yield from executor.wait(_AT_END)
                     if step_by_step or not follows or not self._falls_short(executor):
@@ -227,6 +234,7 @@ class Baseline:
                     )
                 candidates = None
             except StageFailure as failure:
+                self._planner.failed(f"{self.status}: {failure.reason}")
                 failures += 1
                 most = MAX_FAILED_MOVES * plans // MAX_PLANS if step_by_step else budget
                 # In clutter the same plan may be carried out another way.
@@ -282,15 +290,25 @@ class Baseline:
             else:
                 yield from primitives.release(planner, step.subject)
                 progress.made()
+            self._planner.carried_out(step)
 
     def _look_behind(
         self, parts: Sequence[str], planner: MotionPlanner, executor: Executor
     ) -> Iterator[Action]:
-        """Measure what was opened, and look through the hand's camera into what hides an object that a goal is about."""
+        """Measure what was opened, and look through the hand's camera into what hides an object that a goal is about.
+
+        Raises:
+          StageFailure: It does not show, and the plans are for goals.
+        """
         perception, goals = self.perception, self._environment.task.goals
+        follows = self._planner.follows_goals
         perception.look_again()
-        hiding = {goal.part for goal in goals if isinstance(goal, TakenOutGoal)}
-        for name in sorted(hiding.intersection(parts)) if perception.looks_by_hand else ():
+        hiding = set(parts)
+        if follows:
+            hiding &= {goal.part for goal in goals if isinstance(goal, TakenOutGoal)}
+        for name in sorted(hiding) if perception.looks_by_hand else ():
+            if not (follows or perception.unseen):
+                break
             self.status = f"look into {name}"
             estimate = executor.observe()
             way = way_to_look_into(planner.within(estimate.scene), estimate, estimate.parts[name])
@@ -298,7 +316,7 @@ class Baseline:
                 yield from executor.follow(way)
                 yield from executor.open_to(MAX_OPENING)
                 perception.look_closely()
-        for name in sorted(perception.unseen):
+        for name in sorted(perception.unseen) if follows else ():
             raise StageFailure("perception", f"no camera sees enough of {name}, opened or not")
 
     def _recover(
@@ -337,28 +355,6 @@ def _lies(name: str | None, estimate: SceneEstimate) -> bool:
     """Whether this object, which the hand holds, lies on something."""
     held = estimate.objects.get(name or "")
     return held is not None and is_supported(held, estimate.scene)
-
-
-def _until_a_look(plan: Plan) -> Plan:
-    """The steps up to where another part or object than the first part opened comes next.
-
-    What a part opens shows more than was known when the plan was made.
-    """
-    first = plan[0].subject if plan and plan[0].primitive == "grasp_at" else None
-    led = [step for step in plan[:2] if step.subject == first and step.opening is not None]
-    if not led:
-        return plan
-    count = next((i for i, step in enumerate(plan) if step.subject != first), len(plan))
-    return plan[:count]
-
-
-def _led_and_pushed(steps: Plan) -> tuple[Plan, ...]:
-    """Steps that lead a part by its handle, and those that push it on afterwards."""
-    for i in range(1, len(steps)):
-        one, two = steps[i - 1], steps[i]
-        if one.primitive == "release" and two.opening is not None and one.subject == two.subject:
-            return steps[:i], steps[i:]
-    return (steps,)
 
 
 def _share_open(part: PartEstimate) -> float:

@@ -21,6 +21,7 @@ Rules:
 - Open a drawer or door, and let go of its handle, before you put something inside or take something out. Open it nearly all the way.
 - Shut a part again only if that is asked for.
 - Use names, places and openings of the scene only.
+- What is done so far is listed, if anything is: plan only what is left of the instruction.
 - When the instruction cannot be carried out in this scene, or fits several things of it equally well, answer with an empty plan \
 and say why in "refusal". When everything is as asked for already, answer with an empty plan and an empty refusal.\
 """

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from manipose_mj.control.language.completion import one_line
 from manipose_mj.control.language.description import RULES, scene_text
 from manipose_mj.control.language.destinations import Destination, named_destinations
 from manipose_mj.control.language.exchanges import (
@@ -21,9 +22,12 @@ from manipose_mj.control.language.exchanges import (
 from manipose_mj.control.language.reply import (
     NamedMove,
     RefusedError,
+    plain,
+    read_again,
     read_reply,
     reply_schema,
     resolved_plans,
+    step_text,
 )
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Step
@@ -34,6 +38,7 @@ from manipose_mj.tasks.goals import Goal, Tolerance
 
 _NO_TEXT = "(no text)"  # endpoints refuse empty messages
 MAX_REPAIRS = 2
+_MOST_TOLD = 60  # steps that were carried out, the latest
 _MOST_SENT_BACK = 20_000  # characters of a plan that is to be mended
 _TOO_LONG = "reply: it was cut off, for it is longer than an answer may be; give a shorter one"
 
@@ -59,6 +64,8 @@ class LanguagePlanner:
         self._asked_for = instruction or ""
         self._episode: tuple[str, int | None] = ("", None)
         self._number = 0  # of the next question of this episode
+        self._left: tuple[Step | NamedMove, ...] = ()  # of the latest answer, to be carried out
+        self._done: list[str] = []  # what a model is told of this episode
 
     @property
     def follows_goals(self) -> bool:
@@ -73,6 +80,19 @@ class LanguagePlanner:
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
         self._asked_for = self._instruction or instruction
+        self._left, self._done = (), []
+
+    def carried_out(self, step: Step) -> None:
+        """This step of the present plan was carried out: the next question says so."""
+        as_answered = bool(self._left) and plain(self._left[0]) is step
+        self._done.append(step_text(self._left[0] if as_answered else step))
+        # What a plan sets down on the way is no step of the answer: what is left of that is not known then.
+        self._left = self._left[1:] if as_answered else ()
+
+    def failed(self, reason: str) -> None:
+        """The rest of the answer is given up: the next question says why."""
+        self._left = ()
+        self._done.append(f"given up, with the hand emptied: {one_line(reason)}")
 
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         """A model plans to the end."""
@@ -86,6 +106,9 @@ class LanguagePlanner:
         tolerance: Tolerance,
     ) -> Iterator[CandidatePlan]:
         """Plans that do what the model says, the straight one first.
+
+        An answer of which only the first steps were carried out, before the scene was looked at, goes on with the others
+        at their places as they are now; where these are wrong now, the model is asked again.
 
         Args:
           goals: Of the task.
@@ -102,11 +125,23 @@ class LanguagePlanner:
             return places_aside(obj, (), estimate, planner)
 
         destinations = named_destinations(goals, estimate, free)
-        messages = self.question(scene_text(estimate, destinations))
-        schema = reply_schema(estimate, destinations)
-        steps = self.steps(messages, schema, estimate, destinations)
+        steps = self._what_is_left(estimate, destinations)
+        if not steps:
+            messages = self.question(scene_text(estimate, destinations))
+            schema = reply_schema(estimate, destinations)
+            steps = self.steps(messages, schema, estimate, destinations)
+        self._left = steps
         for plan in resolved_plans(steps, estimate, planner):
             yield CandidatePlan(lambda plan=plan: plan)
+
+    def _what_is_left(
+        self, estimate: SceneEstimate, destinations: Mapping[str, Destination]
+    ) -> tuple[Step | NamedMove, ...]:
+        """The steps of the latest answer that come next; none where they cannot be carried out any more."""
+        try:
+            return read_again(self._left, estimate, destinations)
+        except InputError:
+            return ()
 
     def steps(
         self,
@@ -147,9 +182,11 @@ class LanguagePlanner:
 
     def question(self, scene: str) -> list[Message]:
         """The conversation that opens an exchange."""
+        lines = "".join(f"\n- {each}" for each in self._done[-_MOST_TOLD:])
+        done = f"\nDone so far:{lines}" if lines else ""
         return [
             {"role": "system", "content": RULES},
-            {"role": "user", "content": f"{scene}{INSTRUCTION}{self._asked_for}"},
+            {"role": "user", "content": f"{scene}{done}{INSTRUCTION}{self._asked_for}"},
         ]
 
     def _ask(self, messages: list[Message], schema: dict[str, Any]) -> Answer:

@@ -11,7 +11,14 @@ from manipose_mj.control.language.completion import one_line
 from manipose_mj.control.language.destinations import Destination
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.check import PlanState
-from manipose_mj.control.planning.plan import Plan, Step, plan_from_json, plan_schema, shortened
+from manipose_mj.control.planning.plan import (
+    Plan,
+    Step,
+    plan_from_json,
+    plan_schema,
+    plan_to_json,
+    shortened,
+)
 from manipose_mj.control.planning.regrasp import Poses, routes
 from manipose_mj.control.planning.transport import place_at_each
 from manipose_mj.control.scene.articulation import with_part_at
@@ -33,6 +40,18 @@ class NamedMove:
 
     step: Step
     destination: str
+
+
+def plain(step: Step | NamedMove) -> Step:
+    """What is carried out."""
+    return step.step if isinstance(step, NamedMove) else step
+
+
+def step_text(step: Step | NamedMove) -> str:
+    """A step as a model is told of it, such as `move_to mug, destination "table"`."""
+    if isinstance(step, NamedMove):
+        return f'{step.step}, destination "{step.destination}"'
+    return str(step) if step.opening is None else f"{step}, opening {step.opening:.3f}"
 
 
 def reply_schema(
@@ -84,6 +103,28 @@ def read_reply(
         raise RefusedError(one_line(refusal))
     if refusal and not entries:
         raise RefusedError("it gives no reason")
+    return _read_steps(entries, estimate, destinations)
+
+
+def read_again(
+    steps: tuple[Step | NamedMove, ...],
+    estimate: SceneEstimate,
+    destinations: Mapping[str, Destination],
+) -> tuple[Step | NamedMove, ...]:
+    """Steps of an earlier reply with their places as they are now; arguments and errors as of `read_reply`."""
+    entries: list[dict[str, Any]] = []
+    for each in steps:
+        if isinstance(each, NamedMove):
+            move = {"primitive": "move_to", "subject": each.step.subject}
+            entries.append({**move, "destination": each.destination})
+        else:
+            entries += json.loads(plan_to_json((each,)))
+    return _read_steps(entries, estimate, destinations)
+
+
+def _read_steps(
+    entries: list[Any], estimate: SceneEstimate, destinations: Mapping[str, Destination]
+) -> tuple[Step | NamedMove, ...]:
     state = PlanState(estimate)
     steps = tuple(
         _step(entry, f"plan[{i}]", estimate, destinations, state) for i, entry in enumerate(entries)
@@ -185,7 +226,7 @@ def resolved_plans(
       estimate: What is where.
       planner: Of motions in the scene of `estimate`.
     """
-    straight = tuple(step.step if isinstance(step, NamedMove) else step for step in steps)
+    straight = tuple(map(plain, steps))
     yield straight
     moves = [i for i, step in enumerate(steps) if isinstance(step, NamedMove)]
     if len(moves) != 1 or not 0 < moves[0] < len(steps) - 1:

@@ -119,11 +119,11 @@ class EstimatedPerception:
         }
         self.last_estimates: tuple[EstimatedPose, ...] = ()
 
-    def reset(self, seed: int) -> None:
+    def reset(self, seed: int, *, for_goals: bool = True) -> None:
         """Estimate every object of an episode, and build a scene of what is seen.
 
         Raises:
-          StageFailure: An object that a goal is about is not seen, nor is anything that may hide it.
+          StageFailure: An object that a goal is about is not seen, nor is anything that may hide it; only `for_goals`.
           InputError: There are no weights for a category or its type.
         """
         self._keys = random_keys(seed)
@@ -134,9 +134,8 @@ class EstimatedPerception:
         self._world.reset(self._keys())
         self._find_objects()
         among_others = in_the_open(self._task.goals) and not self._task.furniture_masks
-        if self._covered and not (
-            self._known and among_others
-        ):  # these can be moved off what they hide
+        hidden = self._known and among_others  # what hides them can be moved off
+        if for_goals and self._covered and not hidden:
             raise StageFailure("perception", f"no camera sees enough of {min(self._covered)}")
         self._time = self._looked = float(self._physics.data.time)
         self._build()

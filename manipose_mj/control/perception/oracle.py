@@ -39,7 +39,7 @@ class OraclePerception:
         """The arm in the simulator's scene."""
         return self._arm
 
-    def reset(self, seed: int) -> None:
+    def reset(self, seed: int, *, for_goals: bool = True) -> None:
         """Nothing to prepare: nothing is remembered, nothing is random."""
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:

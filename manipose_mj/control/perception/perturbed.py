@@ -93,9 +93,9 @@ class PerturbedPerception:
         """Look through the hand's camera too."""
         self._perception.look_closely()
 
-    def reset(self, seed: int) -> None:
+    def reset(self, seed: int, *, for_goals: bool = True) -> None:
         """Start an episode; errors follow from the seed of its sensors, whatever `seed` is."""
-        self._perception.reset(seed)
+        self._perception.reset(seed, for_goals=for_goals)
         self._held, self._wrong = None, {}
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:

@@ -34,8 +34,16 @@ class Perception(Protocol):
         """The arm in the scene of the last observation."""
         ...
 
-    def reset(self, seed: int) -> None:
-        """Start an episode; `seed` is that of everything random."""
+    def reset(self, seed: int, *, for_goals: bool = True) -> None:
+        """Start an episode.
+
+        Args:
+          seed: Of everything random.
+          for_goals: Whether what goals are about has to be seen, or at least what may hide it.
+
+        Raises:
+          StageFailure: It is not.
+        """
         ...
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol, get_args
 
 from manipose_mj.control.motion.motion_planner import MotionPlanner
-from manipose_mj.control.planning.plan import CandidatePlan, Plan
+from manipose_mj.control.planning.plan import CandidatePlan, Plan, Step
 from manipose_mj.control.planning.plan_articulated import (
     PartGoal,
     leads_through,
@@ -39,6 +39,14 @@ class TaskPlanner(Protocol):
 
     def begin(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
+        ...
+
+    def carried_out(self, step: Step) -> None:
+        """This step of the present plan was carried out; the scene may be looked at before the others are."""
+        ...
+
+    def failed(self, reason: str) -> None:
+        """The rest of the present plan is given up, and the hand is emptied; in one line, at what and why."""
         ...
 
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
@@ -76,6 +84,12 @@ class RulePlanner:
 
     def begin(self, instruction: str) -> None:
         """Goals say all that rules need."""
+
+    def carried_out(self, step: Step) -> None:
+        """The scene shows what came of it."""
+
+    def failed(self, reason: str) -> None:
+        """The next candidate is another plan."""
 
     def step_by_step(self, goals: tuple[Goal, ...], estimate: SceneEstimate) -> bool:
         """In clutter."""

@@ -80,3 +80,10 @@ def test_only_in_clutter_is_anything_moved_off_a_target(pile, monkeypatch):
     monkeypatch.setattr(type(task), "goals", property(lambda self: goals))
     with pytest.raises(StageFailure, match="no camera sees enough of object"):
         perception.reset(0)
+
+
+def test_an_episode_that_is_not_for_its_goals_begins_without_them(pile):
+    task, perception, covered = pile
+    covered.update(task.objects)
+    perception.reset(0, for_goals=False)
+    assert perception.unseen == {"object"} and not perception.observe().objects

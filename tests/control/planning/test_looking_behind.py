@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manipose_mj.control.baseline import _led_and_pushed, _until_a_look
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.planning.plan import Step
 from manipose_mj.control.planning.plan_articulated import parts_to_look_behind
+from manipose_mj.control.planning.plan_pieces import led_and_pushed, opened_by, until_a_look
 from manipose_mj.control.planning.planner import make_plan
 from manipose_mj.tasks.goals import ShutGoal, TakenOutGoal
 from tests.few_objects import load
@@ -37,16 +37,16 @@ def test_with_true_furniture_all_is_planned_at_once(scene):
     assert parts_to_look_behind(goals, estimate) == ()
     assert {step.subject for step in plan} == {"object", DRAWER}
     # Where somebody looks again, only what opens the drawer is carried out before that.
-    assert primitives(_until_a_look(plan)) == primitives(plan[:3])
-    assert {step.subject for step in _until_a_look(plan)} == {DRAWER}
+    assert primitives(until_a_look(plan)) == primitives(plan[:3])
+    assert {step.subject for step in until_a_look(plan)} == {DRAWER}
 
 
 def test_a_door_is_measured_between_being_led_and_being_pushed():
     led = (Step("grasp_at", "door"), Step("move_to", "door", opening=1.5), Step("release", "door"))
     push = Step("move_to", "door", opening=1.5)
-    assert _led_and_pushed((*led, push)) == (led, (push,))
-    assert _led_and_pushed(led) == (led,)
-    assert _led_and_pushed((push, push)) == ((push, push),)
+    assert led_and_pushed((*led, push)) == (led, (push,))
+    assert led_and_pushed(led) == (led,)
+    assert led_and_pushed((push, push)) == ((push, push),)
 
 
 def test_a_cavity_that_nobody_measured_is_opened_first(scene):
@@ -67,3 +67,11 @@ def test_an_object_that_is_hidden_is_looked_for_behind_its_part(scene):
     plan = make_plan(goals, hidden)
     assert {step.subject for step in plan} == {DRAWER}
     assert plan[1].opening is not None and plan[1].opening > 0
+
+
+def test_what_steps_leave_open_is_known(scene):
+    _, estimate = scene
+    low, high = estimate.parts[DRAWER].joint.range
+    wide, shut = (Step("move_to", DRAWER, opening=each) for each in (high, low))
+    assert opened_by((wide,), estimate) == (DRAWER,)
+    assert opened_by((wide, shut), estimate) == ()
