@@ -20,6 +20,8 @@ Rules:
 - The hand holds one thing at a time, and is empty at the end.
 - Open a drawer or door, and let go of its handle, before you put something inside or take something out. Open it nearly all the way.
 - Shut a part again only if that is asked for.
+- Something that is asked for may be unseen: open the part that it may be in, let go of the handle, and end the plan there. \
+What shows then comes with the next question.
 - Use names, places and openings of the scene only.
 - What is done so far is listed, if anything is: plan only what is left of the instruction.
 - When the instruction cannot be carried out in this scene, or fits several things of it equally well, answer with an empty plan \
@@ -31,7 +33,9 @@ def scene_text(estimate: SceneEstimate, destinations: Mapping[str, Destination])
     """The scene in lines: objects, parts and places, in the world's frame, z up [m, rad]."""
     lines = ["Objects:"]
     state = PlanState(estimate)
-    lines += [_object_line(obj, state) for obj in estimate.objects.values()] or ["- none"]
+    objects = [_object_line(obj, state) for obj in estimate.objects.values()]
+    objects += [_unseen_line(name, kind) for name, kind in estimate.unseen.items()]
+    lines += objects or ["- none"]
     lines.append("Parts:")
     lines += [_part_line(part) for part in estimate.parts.values()] or ["- none"]
     lines.append("Places:")
@@ -49,9 +53,16 @@ def _object_line(obj: ObjectEstimate, state: PlanState) -> str:
     stands = "upright" if up > 0.9 else "upside down" if up < -0.9 else "lying"
     around = state.part_around(obj.label_pose)
     where = f"inside {around}" if around else "not in any part"
-    kind = f"a {obj.category.replace('_', ' ')}, " if obj.category else ""
     graspable = "" if len(obj.grasps.poses) else ", too large for the gripper"
-    return f"- {obj.name}: {kind}{sizes} m, middle at ({x:.2f}, {y:.2f}, {z:.2f}), {stands}, {where}{graspable}"
+    return f"- {obj.name}: {_kind(obj.category)}{sizes} m, middle at ({x:.2f}, {y:.2f}, {z:.2f}), {stands}, {where}{graspable}"
+
+
+def _unseen_line(name: str, category: str) -> str:
+    return f"- {name}: {_kind(category)}unseen; a shut part or another object may hide it"
+
+
+def _kind(category: str) -> str:
+    return f"a {category.replace('_', ' ')}, " if category else ""
 
 
 def _part_line(part: PartEstimate) -> str:

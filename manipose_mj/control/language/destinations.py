@@ -58,6 +58,8 @@ def named_destinations(
                 ),
             )
     for goal in goals:
+        if getattr(goal, "object", None) not in estimate.objects:
+            continue  # nobody can bring it there yet
         if isinstance(goal, PoseGoal | OrientationGoal | UprightGoal):
             found[f"goal of {goal.object}"] = Destination(
                 _goal_text(goal),

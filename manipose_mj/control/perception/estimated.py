@@ -267,11 +267,9 @@ class EstimatedPerception:
         scene = self._planning_scene()
         objects = {n: self._estimate(n, sensed, scene) for n, sensed in self._known.items()}
         parts = self._world.parts(scene, objects)
-        self.last_estimates = tuple(
-            EstimatedPose(name, sensed.pose, sensed.confidence, sensed.camera)
-            for name, sensed in self._known.items()
-        )
-        return SceneEstimate(joints, opening, objects, parts, scene)
+        self.last_estimates = tuple(s.reported(name) for name, s in self._known.items())
+        unseen = {n: kinds_of(self._task.objects)[n].category for n in sorted(self.unseen)}
+        return SceneEstimate(joints, opening, objects, parts, scene, unseen)
 
     def hold(self, name: str | None) -> None:
         """From now on the hand holds this, as it was seen last; None: it holds nothing."""

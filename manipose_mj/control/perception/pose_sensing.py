@@ -61,6 +61,10 @@ class SensedPose:
     camera: str
     points: int = 0
 
+    def reported(self, name: str) -> EstimatedPose:
+        """What reports have of it, where it is this object's."""
+        return EstimatedPose(name, self.pose, self.confidence, self.camera)
+
 
 @dataclass(frozen=True)
 class EstimatedPose:

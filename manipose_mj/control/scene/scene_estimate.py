@@ -6,8 +6,8 @@ knows the difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -152,6 +152,7 @@ class SceneEstimate:
       objects: By name.
       parts: By name.
       scene: What a motion could hit; it has everything where the estimates have it.
+      unseen: Categories of what goals are about and nothing has shown yet, by name.
     """
 
     joints: Float[np.ndarray, "7"]
@@ -159,6 +160,7 @@ class SceneEstimate:
     objects: dict[str, ObjectEstimate]
     parts: dict[str, PartEstimate]
     scene: PlanningScene
+    unseen: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tcp_pose(self) -> Float[np.ndarray, "4 4"]:
