@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manipose_mj.control.language.destinations import Destination
+from manipose_mj.control.language.part_descriptions import words_for_parts
 from manipose_mj.control.planning.check import PlanState
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimate, SceneEstimate
 
@@ -36,8 +37,9 @@ def scene_text(estimate: SceneEstimate, destinations: Mapping[str, Destination])
     objects = [_object_line(obj, state) for obj in estimate.objects.values()]
     objects += [_unseen_line(name, kind) for name, kind in estimate.unseen.items()]
     lines += objects or ["- none"]
-    lines.append("Parts:")
-    lines += [_part_line(part) for part in estimate.parts.values()] or ["- none"]
+    lines.append("Parts, the highest first:")
+    words = words_for_parts(estimate.parts)
+    lines += [_part_line(part, words[part.name]) for part in _from_above(estimate)] or ["- none"]
     lines.append("Places:")
     lines += [
         f'- "{name}": {place.text}' + (f"; only for {place.only_for}" if place.only_for else "")
@@ -65,15 +67,24 @@ def _kind(category: str) -> str:
     return f"a {category.replace('_', ' ')}, " if category else ""
 
 
-def _part_line(part: PartEstimate) -> str:
+def _from_above(estimate: SceneEstimate) -> list[PartEstimate]:
+    """Parts by their handles: the highest first, of one height the leftmost."""
+    handles = {name: part.handle_pose[:3, 3] for name, part in estimate.parts.items()}
+    order = sorted(
+        handles, key=lambda name: (-round(float(handles[name][2]), 2), -handles[name][1])
+    )
+    return [estimate.parts[name] for name in order]
+
+
+def _part_line(part: PartEstimate, words: str) -> str:
     low, high = part.joint.range
-    kind, unit = ("drawer", "m") if part.joint.kind == "slide" else ("door", "rad")
+    unit = "m" if part.joint.kind == "slide" else "rad"
     x, y, z = (float(v) for v in part.handle_pose[:3, 3])
     room = "encloses nothing"
     if part.cavity is not None:
         sizes = " x ".join(f"{float(v):.2f}" for v in part.cavity.extents)
         room = f"closes a room of {sizes} m"
     return (
-        f"- {part.name}: {kind}, its joint is at {part.opening:.3f} {unit}, shut at {low:.3f}, wide open at {high:.3f}; "
+        f"- {part.name}: {words}, its joint is at {part.opening:.3f} {unit}, shut at {low:.3f}, wide open at {high:.3f}; "
         f"handle at ({x:.2f}, {y:.2f}, {z:.2f}); {room}"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -25,6 +26,7 @@ from manipose_mj.control.scene.scene_estimate import ObjectEstimate, PartEstimat
 from manipose_mj.mjcf.panda.robot import Panda
 from manipose_mj.poses import invert, pose_to_vector
 from manipose_mj.tasks.core.task import ManipulationTask
+from manipose_mj.tasks.instructions.sentence import asked_parts
 
 _ROBOT = "panda"
 _BASE = f"{PREFIX}furniture"
@@ -151,7 +153,9 @@ class SensedWorld:
         bodies = {name: self.body(name) for name in self._furniture.part_poses()}
         geoms = {name: subtree_geoms(scene.model, body) for name, body in bodies.items()}
         carried = {name: (self.body(_extra_of(name)),) for name in self._with_extra}
-        return self._furniture.parts(bodies, geoms, objects, carried)
+        asked = asked_parts(self._task)
+        found = self._furniture.parts(bodies, geoms, objects, carried)
+        return {name: replace(part, called=asked.get(name, "")) for name, part in found.items()}
 
     def follow(
         self, tcp_pose: Float[np.ndarray, "4 4"], objects: Poses

@@ -121,6 +121,7 @@ class PartEstimate:
       bodies_inside: Bodies of the objects in its cavity, which move with a drawer.
       cavity_seen: Whether the cavity is known; else it is what is usual behind such a part.
       goes_on: Whether it was opened as far as is usual, and did not stop: it opens further than anybody knows.
+      called: What an instruction calls it, such as `"middle drawer"`, where that is how it was found; else empty.
     """
 
     name: str
@@ -135,6 +136,7 @@ class PartEstimate:
     bodies_inside: tuple[int, ...] = ()
     cavity_seen: bool = True
     goes_on: bool = False
+    called: str = ""
 
     @property
     def handle_pose(self) -> Float[np.ndarray, "4 4"]:

@@ -17,6 +17,9 @@ NO_GEOMS = np.zeros(1, bool)
 NO_SCENE = Mock(spec=PlanningScene)
 UPRIGHT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 Y = np.array([0.0, 1.0, 0.0])
+BAR = np.array(
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+)  # level, its Y towards the robot
 
 
 def rigid(
@@ -45,7 +48,7 @@ def drawer(name: str, height: float, opening: float = 0.0) -> PartEstimate:
     """A drawer of a cabinet ahead of the robot that opens towards it by up to 0.2 m."""
     base = compose(np.eye(3), np.array([0.9, 0.0, 0.0]))
     handle = PoseLabel(
-        np.array([-0.2, 0.0, height]), np.eye(3), "handle", np.array([0.1, 0.03, 0.01]),
+        np.array([-0.2, 0.0, height]), BAR, "handle", np.array([0.1, 0.03, 0.01]),
         SymmetryGroup.identity(),
     )  # fmt: skip
     cavity = Cavity(np.array([0.0, 0.0, height]), np.array([0.28, 0.3, 0.12]), moves_with_part=True)
@@ -58,7 +61,7 @@ def door(name: str, opening: float = 0.0, center: tuple[float, float, float] = (
     """A door in front of a room 0.24 m wide, deep and high."""
     base = compose(np.eye(3), np.array([0.9, 0.0, 0.0]))
     handle = PoseLabel(
-        np.array([-0.2, -0.1, center[2]]), np.eye(3), "handle", np.array([0.1, 0.03, 0.01]),
+        np.array([-0.2, -0.1, center[2]]), BAR, "handle", np.array([0.1, 0.03, 0.01]),
         SymmetryGroup.identity(),
     )  # fmt: skip
     cavity = Cavity(np.array(center), np.full(3, 0.24), moves_with_part=False)
