@@ -56,7 +56,8 @@ def _object_line(obj: ObjectEstimate, state: PlanState) -> str:
     around = state.part_around(obj.label_pose)
     where = f"inside {around}" if around else "not in any part"
     graspable = "" if len(obj.grasps.poses) else ", too large for the gripper"
-    return f"- {obj.name}: {_kind(obj.category)}{sizes} m, middle at ({x:.2f}, {y:.2f}, {z:.2f}), {stands}, {where}{graspable}"
+    colours = f"{obj.colours}, " if obj.colours else ""
+    return f"- {obj.name}: {_kind(obj.category)}{colours}{sizes} m, middle at ({x:.2f}, {y:.2f}, {z:.2f}), {stands}, {where}{graspable}"
 
 
 def _unseen_line(name: str, category: str) -> str:

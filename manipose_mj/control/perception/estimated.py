@@ -31,6 +31,7 @@ from manipose_mj.control.perception.grasp_sources import sensed_grasps
 from manipose_mj.control.perception.in_hand import InHand, is_gone
 from manipose_mj.control.perception.kind_estimators import shipped_estimator
 from manipose_mj.control.perception.objects.asked_objects import asked_rotations, in_the_open
+from manipose_mj.control.perception.objects.colour_words import SeenColours
 from manipose_mj.control.perception.objects.goal_depth import as_unsure_as_deep
 from manipose_mj.control.perception.objects.object_kinds import ObjectKind, kinds_of
 from manipose_mj.control.perception.objects.object_views import ObjectView, ObjectViews, seen_points
@@ -104,6 +105,7 @@ class EstimatedPerception:
         self.looks_by_hand = HAND_CAMERA in sensors.camera_names
         self._close_views = ObjectViews(task.task_observables, sensors.camera_names)
         self._sights = SceneViews(task.task_observables, usual)
+        self._colours = SeenColours(lambda name: self._more_views.of(physics, name))
         self._known: dict[str, SensedPose] = {}
         self._grasps: dict[str, Callable[..., GraspSet]] = {}
         self._held: InHand | None = None
@@ -129,6 +131,7 @@ class EstimatedPerception:
         self._keys = random_keys(seed)
         self._held, self._dropped, self._lost = None, set(), set()
         self._known, self._seen, self._grasps = {}, {}, {}
+        self._colours.forget()
         for kind in kinds_of(self._task.objects).values():
             self._load(kind)  # what has no weights is told before anything is built
         self._world.reset(self._keys())
@@ -386,6 +389,7 @@ class EstimatedPerception:
             geoms=subtree_geoms(scene.model, body),
             rests=sensed.shape.rests,
             category=kind.category,
+            find_colours=partial(self._colours.of, name),
             uncertainty=sensed.misfit if self._grasp_source == "cloud" else 0.0,
             guessed_frame=not kind.in_catalogue
             or kind.object_type != sensed.shape.label.object_type,

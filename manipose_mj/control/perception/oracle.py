@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from dm_control import mjcf
@@ -11,6 +12,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import GraspSet
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.perception.furniture_perception import TrueFurniture
+from manipose_mj.control.perception.objects.colour_words import surface_colour_words
 from manipose_mj.control.scene.collision_model import CollisionModel, subtree_geoms
 from manipose_mj.control.scene.planning_scene import PlanningScene
 from manipose_mj.control.scene.scene_estimate import ObjectEstimate, SceneEstimate
@@ -28,6 +30,7 @@ class OraclePerception:
         self._model = CollisionModel(physics.model.ptr, task.robot.mjcf_model.model)
         self._furniture = TrueFurniture(task, physics)
         self._arm = ArmModel(task.root_entity.mjcf_model, task.robot.mjcf_model.model)
+        self._colours: dict[str, str] = {}
         self.sources: Mapping[str, str] = {"objects": "true", "furniture": self._furniture.source}
 
     feels_joints = False
@@ -40,7 +43,8 @@ class OraclePerception:
         return self._arm
 
     def reset(self, seed: int, *, for_goals: bool = True) -> None:
-        """Nothing to prepare: nothing is remembered, nothing is random."""
+        """Nothing to prepare: only colours are remembered, nothing is random."""
+        self._colours = {}
 
     def robot(self) -> tuple[Float[np.ndarray, "7"], float]:
         """Joint angles [rad] and opening [m]."""
@@ -88,4 +92,12 @@ class OraclePerception:
             geoms=subtree_geoms(self._model.model, body),
             rests=entity.asset.stable_poses,
             category=entity.asset.category,
+            find_colours=partial(self._colours_of, name, body),
         )
+
+    def _colours_of(self, name: str, body: int) -> str:
+        """Of the object's materials and textures."""
+        if name not in self._colours:
+            model = self._physics.model.ptr
+            self._colours[name] = surface_colour_words(model, subtree_geoms(model, body))
+        return self._colours[name]

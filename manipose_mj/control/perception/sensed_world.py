@@ -66,6 +66,7 @@ class SensedWorld:
         self._surroundings: Boxes = no_boxes()
         self._model: CollisionModel | None = None
         self._arm: ArmModel | None = None
+        self._called: Mapping[str, str] = {}  # words of the instruction for parts
         self._with_extra: tuple[str, ...] = ()  # parts on which more was seen than they are made of
 
     @property
@@ -85,6 +86,7 @@ class SensedWorld:
         Raises:
           StageFailure: A part that a goal is about is not found.
         """
+        self._called = asked_parts(self._task)
         self._furniture.reset(key)
         self._followed = self._furniture.model
         clouds = [
@@ -153,9 +155,9 @@ class SensedWorld:
         bodies = {name: self.body(name) for name in self._furniture.part_poses()}
         geoms = {name: subtree_geoms(scene.model, body) for name, body in bodies.items()}
         carried = {name: (self.body(_extra_of(name)),) for name in self._with_extra}
-        asked = asked_parts(self._task)
         found = self._furniture.parts(bodies, geoms, objects, carried)
-        return {name: replace(part, called=asked.get(name, "")) for name, part in found.items()}
+        called = self._called
+        return {name: replace(part, called=called.get(name, "")) for name, part in found.items()}
 
     def follow(
         self, tcp_pose: Float[np.ndarray, "4 4"], objects: Poses

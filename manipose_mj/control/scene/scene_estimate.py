@@ -37,6 +37,7 @@ class ObjectEstimate:
       guessed_frame: Whether where its label is in it is but a guess, its shape being that of its own cloud: a pose that
         is asked for then leaves it a little in the air or in what it shall lie on.
       sample_more: Gives many more grasps, for where `grasps` do not do; None: there are no others.
+      find_colours: Gives `colours`; called when somebody needs them.
     """
 
     name: str
@@ -50,11 +51,17 @@ class ObjectEstimate:
     uncertainty: float = 0.0
     guessed_frame: bool = False
     sample_more: Callable[[], GraspSet] | None = None
+    find_colours: Callable[[], str] = str
 
     @property
     def grasps(self) -> GraspSet:
         """In the object frame."""
         return self.sample_grasps()
+
+    @property
+    def colours(self) -> str:
+        """Words such as `red` or `blue and white`; empty where nobody knows."""
+        return self.find_colours()
 
     @property
     def label_pose(self) -> Float[np.ndarray, "4 4"]:

@@ -30,6 +30,7 @@ def rigid(
     *,
     lying: bool = False,
     graspable: bool = True,
+    colours: str = "",
 ) -> ObjectEstimate:
     """An object with its label's middle at `place` [m]."""
     rotation = rotation_about(Y, np.pi / 2) @ UPRIGHT if lying else UPRIGHT
@@ -41,7 +42,16 @@ def rigid(
         np.tile(np.eye(4), (count, 1, 1)), np.full(count, 0.05), np.ones((count, 1), bool)
     )
     pose = compose(rotation, np.array(place))
-    return ObjectEstimate(name, pose, label, lambda: grasps, 1, NO_GEOMS, category=category)
+    return ObjectEstimate(
+        name,
+        pose,
+        label,
+        lambda: grasps,
+        1,
+        NO_GEOMS,
+        category=category,
+        find_colours=lambda: colours,
+    )
 
 
 def drawer(name: str, height: float, opening: float = 0.0) -> PartEstimate:
@@ -111,6 +121,20 @@ def kitchenette() -> SceneEstimate:
     )
 
 
+def counter() -> SceneEstimate:
+    """Two cans and a mug that only their colours and kinds tell apart; three shut drawers."""
+    return scene(
+        [
+            rigid("clutter_0", "can", (0.10, 0.066, 0.066), (0.5, -0.1, 0.05), colours="blue"),
+            rigid(
+                "object", "can", (0.12, 0.066, 0.066), (0.45, 0.1, 0.06), colours="red and white"
+            ),
+            rigid("clutter_1", "mug", (0.09, 0.11, 0.08), (0.4, 0.25, 0.045), colours="red"),
+        ],
+        [drawer("part_0", 0.15), drawer("middle_drawer", 0.3), drawer("part_2", 0.45)],
+    )
+
+
 def desk() -> SceneEstimate:
     """No furniture: a hammer, two boxes, and a helmet that is too large for the gripper."""
     return scene(
@@ -124,4 +148,4 @@ def desk() -> SceneEstimate:
     )
 
 
-SCENES = {"kitchen": kitchen, "kitchenette": kitchenette, "desk": desk}
+SCENES = {"counter": counter, "kitchen": kitchen, "kitchenette": kitchenette, "desk": desk}

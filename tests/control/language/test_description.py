@@ -11,7 +11,7 @@ from manipose_mj.control.language.destinations import named_destinations
 from manipose_mj.control.language.reply import reply_schema
 from manipose_mj.poses import compose
 from manipose_mj.tasks.goals import PoseGoal, TakenOutGoal
-from tests.control.language.scenes import door, drawer, kitchenette, scene
+from tests.control.language.scenes import counter, door, drawer, kitchenette, scene
 
 AREA = TakenOutGoal("bowl", "microwave_door", np.array([0.4, -0.3]), np.array([0.05, 0.05]))
 
@@ -71,3 +71,13 @@ def test_pieces_of_furniture_have_words_of_their_own():
         "- other: drawer",
         "- lower: bottom drawer",
     ]
+
+
+def test_colours_tell_objects_apart_that_have_no_names():
+    lines = scene_text(counter(), {}).splitlines()
+    assert [line.partition(" 0.")[0] for line in lines[1:4]] == [
+        "- clutter_0: a can, blue,",
+        "- object: a can, red and white,",
+        "- clutter_1: a mug, red,",
+    ]
+    assert "- bowl: a bowl, 0.06 x" in scene_text(kitchenette(), {})  # nobody knows

@@ -10,6 +10,7 @@ from manipose_mj import suite
 from manipose_mj.control import baseline as baseline_module
 from manipose_mj.control.baseline import Baseline
 from manipose_mj.control.furniture import estimated_furniture
+from manipose_mj.control.perception import sensed_world
 from manipose_mj.control.perception.pose_sources import sensors_for
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -35,7 +36,8 @@ def act(environment, pose: str, monkeypatch, steps: int) -> int:
     task = environment.task
     # The task's own words and goals are what the episode asks for.
     monkeypatch.setattr(baseline_module, "instruction", lambda _: instruction(task))
-    monkeypatch.setattr(estimated_furniture, "asked_parts", lambda _: asked_parts(task))
+    for module in (estimated_furniture, sensed_world):
+        monkeypatch.setattr(module, "asked_parts", lambda _: asked_parts(task))
     taken = 0
     try:
         for action in Baseline(denied(environment), pose).actions(0):
