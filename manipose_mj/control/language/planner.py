@@ -32,6 +32,8 @@ from manipose_mj.control.language.reply import (
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.plan import CandidatePlan, Step
 from manipose_mj.control.planning.set_aside import places_aside
+from manipose_mj.control.planning.table_places import CONTACT, HOME
+from manipose_mj.control.scene.collision_query import CollisionQuery
 from manipose_mj.control.scene.scene_estimate import SceneEstimate
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.goals import Goal, Tolerance
@@ -121,8 +123,12 @@ class LanguagePlanner:
           RecordError: The exchange cannot be written.
         """
 
+        # What was opened may stand where the arm waits otherwise: every place would seem taken.
+        blocked = planner.collides(HOME, CollisionQuery(clearance=CONTACT))
+        joints = estimate.joints if blocked else HOME
+
         def free(obj):
-            return places_aside(obj, (), estimate, planner)
+            return places_aside(obj, (), estimate, planner, joints=joints)
 
         destinations = named_destinations(goals, estimate, free)
         steps = self._what_is_left(estimate, destinations)

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.planning.table_places import (
     DROP_HEIGHT,
+    HOME,
     UP,
     is_free,
     resting_height,
@@ -48,6 +49,7 @@ def places_aside(
     estimate: SceneEstimate,
     planner: MotionPlanner,
     attempt: int = 0,
+    joints: Float[np.ndarray, "7"] = HOME,
 ) -> Poses:
     """`T_world_label` where the object is out of everybody's way, turned as little as it can be.
 
@@ -57,6 +59,7 @@ def places_aside(
       estimate: What is where.
       planner: Plans in the scene of `estimate`.
       attempt: The nearest places come at the first, 0; the next ones and other sides down at each later one.
+      joints: Where the arm is by then [rad].
 
     Returns:
       Poses with as much room around them as there is; none where the table is full.
@@ -77,7 +80,7 @@ def places_aside(
             if near:
                 continue
             poses = (pose for turn in turns for pose in _poses_at(obj, rotations, xy, turn))
-            found += [pose for pose in poses if is_free(planner, obj, pose)]
+            found += [pose for pose in poses if is_free(planner, obj, pose, joints)]
             if len(found) >= enough * (attempt + 1):
                 break
         if found:

@@ -146,7 +146,10 @@ def upright_poses(obj: ObjectEstimate) -> tuple[Float[np.ndarray, "4 4"], ...]:
 
 
 def is_free(
-    planner: MotionPlanner, obj: ObjectEstimate, label_pose: Float[np.ndarray, "4 4"]
+    planner: MotionPlanner,
+    obj: ObjectEstimate,
+    label_pose: Float[np.ndarray, "4 4"],
+    joints: Float[np.ndarray, "7"] = HOME,
 ) -> bool:
-    """Whether the object would touch nothing but its support there."""
-    return not planner.collides(HOME, obj.placed_at(label_pose).query(CONTACT))
+    """Whether the object would touch nothing but its support there, the arm at `joints` [rad]."""
+    return not planner.collides(joints, obj.placed_at(label_pose).query(CONTACT))

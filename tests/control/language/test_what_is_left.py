@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from unittest.mock import Mock, patch
 
+import numpy as np
 import pytest
 
 from manipose_mj.control.baseline import Baseline
@@ -15,6 +16,7 @@ from manipose_mj.control.language.planner import LanguagePlanner
 from manipose_mj.control.motion.motion_planner import MotionPlanner
 from manipose_mj.control.perception.oracle import OraclePerception
 from manipose_mj.control.planning.plan import Plan
+from manipose_mj.control.planning.table_places import HOME
 from manipose_mj.failures import StageFailure
 from manipose_mj.tasks.goals import Tolerance
 from tests.control.language.scenes import kitchen
@@ -60,7 +62,7 @@ class Model:
 
 def planned(planner: LanguagePlanner) -> Plan:
     """The next plan in the kitchen, where any place on the table is free."""
-    with patch.object(language_planner, "places_aside", lambda obj, *_: (obj.label_pose,)):
+    with patch.object(language_planner, "places_aside", lambda obj, *_, **__: (obj.label_pose,)):
         candidates = planner.candidates((), kitchen(), Mock(spec=MotionPlanner), Tolerance())
         return next(candidates).steps()
 
@@ -110,6 +112,15 @@ def test_a_failure_is_told_with_what_was_done_before_it():
     planner.begin("Put the mug elsewhere.")
     planned(planner)
     assert "Done so far" not in model.questions[2]  # another episode
+
+
+def test_places_on_the_table_are_free_though_a_drawer_stands_where_the_arm_waits():
+    motions = Mock(spec=MotionPlanner)
+    motions.collides.side_effect = lambda joints, query: np.array_equal(joints, HOME)
+    planner = LanguagePlanner(Model(put("mug", "table")))
+    planner.begin("Put the mug elsewhere.")
+    plan = next(planner.candidates((), kitchen(), motions, Tolerance())).steps()
+    assert words(plan) == ["grasp_at mug", "move_to mug", "release mug"]
 
 
 @pytest.fixture
