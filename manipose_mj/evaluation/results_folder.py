@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,7 @@ from manipose_mj.evaluation.records import EpisodeResult, read_results, to_line
 RESULTS_FILE = "results.jsonl"
 SUMMARY_FILE = "summary.json"
 RUN_FILE = "run.json"
+_DISK_FAILURES = {errno.ENOSPC, errno.EIO, errno.EROFS, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager
@@ -39,12 +41,19 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
                 _remove_if_empty(file, out, new)
                 raise
     except OSError as error:
-        if error.filename is not None and not str(error.filename).startswith(str(out)):
+        if not _is_of(error, out):
             raise
         raise InputError(
             f"{out}: cannot write results there ({error.strerror or error}); "
             "those of finished episodes are safe: make room, then --resume goes on"
         ) from None
+
+
+def _is_of(error: OSError, out: Path) -> bool:
+    """Whether it was the results that could not be written; a full disk is told without a name."""
+    if error.filename is None:
+        return error.errno in _DISK_FAILURES
+    return Path(os.fsdecode(error.filename)).absolute().is_relative_to(out.absolute())
 
 
 def _remove_if_empty(file: IO[bytes], out: Path, new: bool) -> None:

@@ -6,10 +6,18 @@ import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float, Int
 
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import MODEL_FILE, Asset
 from manipose_mj.assets.physics import SCENE_CONTACT_TIME
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
+
+
+def _read_model(asset: Asset) -> mjcf.RootElement:
+    try:
+        return mjcf.from_path(str(asset.model_path))
+    except (OSError, ValueError, SyntaxError) as error:  # lxml's are SyntaxError
+        line = " ".join(str(error).split())
+        raise InputError(f"{asset.place}/{MODEL_FILE}: cannot be read: {line}") from None
 
 
 def _stiffen(root: mjcf.RootElement) -> None:
@@ -25,7 +33,7 @@ class RigidObject(composer.Entity):
         if asset.kind != "rigid":
             raise InputError(f"{asset.place}: is an {asset.kind} asset; expected a rigid one")
         self.asset = asset
-        self._mjcf_root = mjcf.from_path(str(asset.model_path))
+        self._mjcf_root = _read_model(asset)
         self._mjcf_root.model = name or asset.name
         _stiffen(self._mjcf_root)
         # The arena's attachment frame carries the free joint instead of the stand-alone model's.
@@ -69,7 +77,7 @@ class ArticulatedObject(composer.Entity):
         if asset.kind != "articulated":
             raise InputError(f"{asset.place}: is a {asset.kind} asset; expected an articulated one")
         self.asset = asset
-        self._mjcf_root = mjcf.from_path(str(asset.model_path))
+        self._mjcf_root = _read_model(asset)
         self._mjcf_root.model = name or asset.name
         _stiffen(self._mjcf_root)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
@@ -48,3 +49,21 @@ def test_a_kept_line_that_the_run_does_not_ask_for_is_refused_and_stays(tmp_path
         evaluate(config(tmp_path), resume=True, runner=fake.make_runner())
     assert said in str(refusal.value) and "\n" not in str(refusal.value)
     assert path.read_text() == edited
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "ours"),
+    [
+        ("r-beside/mug.obj", errno.ENOENT, False),
+        (None, errno.ECONNRESET, False),
+        ("r/trajectories/x.npz", errno.EACCES, True),
+        (None, errno.EIO, True),
+    ],
+)
+def test_only_a_failure_of_the_folder_is_told_as_one(tmp_path, name, number, ours):
+    def failing(config, spec, *, episode, pose):
+        raise OSError(number, "it failed", None if name is None else str(tmp_path / name))
+
+    with pytest.raises(InputError if ours else OSError) as failure:
+        evaluate(config(tmp_path / "r"), runner=failing)
+    assert ("cannot write results there" in str(failure.value)) is ours

@@ -8,6 +8,7 @@ from pathlib import Path
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.asset import ASSET_FILE, Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.model_file import check_model
 
 
 def select_assets(chosen: Iterable[Asset | str | Path]) -> tuple[Asset, ...]:
@@ -18,16 +19,18 @@ def select_assets(chosen: Iterable[Asset | str | Path]) -> tuple[Asset, ...]:
         A string with a path separator, or that is a folder, means a folder.
 
     Raises:
-      InputError: There is no built-in object of a name, or no asset in a folder.
+      InputError: There is no built-in object of a name, no asset in a folder, or the model of one cannot be used.
     """
     found: list[Asset] = []
     for each in chosen:
-        if isinstance(each, Asset):
-            found.append(each)
-        elif is_folder(each):
-            found.extend(read_asset(folder) for folder in asset_folders(Path(each)))
-        else:
+        if not isinstance(each, Asset) and not is_folder(each):
             found.append(catalogue.load_by_name(str(each)))
+            continue
+        folders = [] if isinstance(each, Asset) else asset_folders(Path(each))
+        own = [each] if isinstance(each, Asset) else [read_asset(folder) for folder in folders]
+        for asset in own:
+            check_model(asset)
+        found.extend(own)
     return tuple(found)
 
 
