@@ -143,6 +143,7 @@ def test_bad_flags_exit_with_2(argv: str, capsys) -> None:
         ("assets list {tmp}", "holds no asset folder"),
         ("assets check {tmp}/none", "no such folder"),
         ("assets show {tmp}/broken", "field 'category' is missing"),
+        ("assets show mgu_000", "did you mean mug_000"),
         ("assets build ycbb {tmp} --out {tmp}/out", "did you mean ycb"),
         ("assets build ycb {tmp}/none --out {tmp}/out", "none"),
     ],
@@ -256,6 +257,11 @@ def test_list_is_complete_and_machine_readable(capsys) -> None:
     assert {row["task"] for row in listed["tasks"]} >= set(fake.TASKS)
     assert all(row["description"] for row in listed["tasks"])
     assert "mug_000" in listed["objects"]["mug"]
+
+
+def test_show_takes_the_names_that_are_listed(capsys) -> None:
+    assert main(["assets", "show", "mug_000", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["name"] == "mug_000"
 
 
 @pytest.mark.parametrize(

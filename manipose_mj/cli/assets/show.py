@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def show_asset(
-    folder: Annotated[Positional[Path], arg(metavar="DIR/NAME")],
+    name: Annotated[Positional[str], arg(metavar="NAME|DIR")],
     /,
     *,
     json: bool = False,
@@ -21,24 +21,27 @@ def show_asset(
     """Show one asset: label, mass, stable poses, grasps, moving parts, provenance.
 
     Args:
-      folder: The asset's folder.
+      name: Of a built-in object, or the asset's folder.
       json: Print the content of its asset.json, once checked, for other programs.
     """
     from manipose_mj.assets.asset import ASSET_FILE
     from manipose_mj.assets.asset_json import read_asset
+    from manipose_mj.assets.catalogue import load_by_name
     from manipose_mj.console import output
 
-    asset = read_asset(folder)
+    own = "/" in name or Path(name).is_dir()
+    asset = read_asset(name) if own else load_by_name(name)
     if json:
         import json as json_format
 
-        output.write_json(json_format.loads((folder / ASSET_FILE).read_text(encoding="utf-8")))
+        text = (asset.folder / ASSET_FILE).read_text(encoding="utf-8")
+        output.write_json(json_format.loads(text))
         return
     from rich.table import Table
 
     table = Table(show_header=False, title=asset.name, title_justify="left")
-    for name, value in _rows(asset):
-        table.add_row(name, value)
+    for field, value in _rows(asset):
+        table.add_row(field, value)
     output.standard_output().print(table)
 
 
