@@ -109,21 +109,36 @@ def register_suite() -> None:
 
     Calling it again changes nothing.
     """
-    on_registration(_add_to_dm_control)
+    on_registration(_DM_CONTROL)
 
 
-def _add_to_dm_control(spec: TaskSpec) -> None:
-    from dm_control import suite as dm_suite
-    from dm_control.utils import containers
+class _DmControl:
+    """`dm_control.suite`'s lists of tasks."""
 
-    module: Any = dm_suite._DOMAINS.get(spec.domain)
-    if module is None:
-        module = types.ModuleType(f"{__name__}.{spec.domain}")
-        module.SUITE = containers.TaggedTasks()
-        dm_suite._DOMAINS[spec.domain] = module
-    module.SUITE.add(*spec.tags)(_suite_factory(spec))
-    dm_suite.ALL_TASKS = (*dm_suite.ALL_TASKS, (spec.domain, spec.name))
-    dm_suite.TASKS_BY_DOMAIN[spec.domain] = tuple(module.SUITE)
+    def check(self, spec: TaskSpec) -> None:
+        from dm_control import suite as dm_suite
+
+        module: Any = dm_suite._DOMAINS.get(spec.domain)
+        if module is not None and spec.name in module.SUITE:
+            raise ValueError(
+                f"task {spec.full_name}: dm_control has a task of that name; choose another"
+            )
+
+    def add(self, spec: TaskSpec) -> None:
+        from dm_control import suite as dm_suite
+        from dm_control.utils import containers
+
+        module: Any = dm_suite._DOMAINS.get(spec.domain)
+        if module is None:
+            module = types.ModuleType(f"{__name__}.{spec.domain}")
+            module.SUITE = containers.TaggedTasks()
+            dm_suite._DOMAINS[spec.domain] = module
+        module.SUITE.add(*spec.tags)(_suite_factory(spec))
+        dm_suite.ALL_TASKS = (*dm_suite.ALL_TASKS, (spec.domain, spec.name))
+        dm_suite.TASKS_BY_DOMAIN[spec.domain] = tuple(module.SUITE)
+
+
+_DM_CONTROL = _DmControl()
 
 
 def _suite_factory(spec: TaskSpec) -> Any:

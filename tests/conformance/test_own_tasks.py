@@ -92,6 +92,15 @@ def test_a_name_is_taken_once(lift_mug):
     assert ("example", "target_pose") not in suite.ALL_TASKS
 
 
+def test_a_refused_task_is_registered_nowhere():
+    manipose_mj.register_suite()
+    before = suite.ALL_TASKS, dm_suite.ALL_TASKS, set(gymnasium.registry)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="^task cartpole/swingup: dm_control has a task of"):
+            manipose_mj.register_task("cartpole", "swingup")(diverging)
+    assert before == (suite.ALL_TASKS, dm_suite.ALL_TASKS, set(gymnasium.registry))
+
+
 def test_modules_that_the_environment_names_are_imported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

@@ -6,11 +6,11 @@ import fnmatch
 import importlib
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, brief, unknown_name
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects
 from manipose_mj.tasks.core.task import ManipulationTask
@@ -67,10 +67,22 @@ def _registered(module: str, domain: str, name: str) -> TaskSpec:
     return task_spec(domain, name)
 
 
+class Listener(Protocol):
+    """A front door that keeps tasks in a list of its own."""
+
+    def check(self, spec: TaskSpec) -> None:
+        """Raise ValueError for a task that it cannot take; changes nothing."""
+        ...
+
+    def add(self, spec: TaskSpec) -> None:
+        """Take a task."""
+        ...
+
+
 GYM_NAMESPACE = "manipose_mj"
 _WORDS = re.compile(r"[a-z0-9]+(_[a-z0-9]+)*")
 _TASKS: dict[tuple[str, str], TaskSpec] = {}
-_listeners: list[Callable[[TaskSpec], None]] = []
+_listeners: list[Listener] = []
 
 
 FactoryT = TypeVar("FactoryT", bound=Factory)
@@ -80,7 +92,7 @@ def register_task(
     domain: str,
     name: str,
     *,
-    tags: tuple[str, ...] = (),
+    tags: Sequence[str] = (),
     draws: ObjectDrawFactory | None = None,
 ) -> Callable[[FactoryT], FactoryT]:
     """Register the decorated factory as `domain/name`: for this package's tasks and for anybody's.
@@ -100,17 +112,26 @@ def register_task(
     to the task's card.
 
     Raises:
-      ValueError: The name is none or taken, or the factory has no docstring.
+      ValueError: The name is none or taken, here or at a front door, tags are no words, `draws` cannot be called, or the
+        factory has no docstring; nothing is registered then.
     """
 
     def decorate(factory: FactoryT) -> FactoryT:
         _check_name(domain, name)
+        task = f"task {domain}/{name}"
+        words = isinstance(tags, tuple | list) and all(isinstance(tag, str) for tag in tags)
+        if not words:
+            raise ValueError(f"{task}: tags is {brief(tags)}; expected a tuple of words")
+        if draws is not None and not callable(draws):
+            raise ValueError(f"{task}: draws is {brief(draws)}; expected a function")
         if not factory.__doc__:
             raise ValueError(f"the factory of {domain}/{name} needs a docstring")
         summary = factory.__doc__.strip().splitlines()[0]
-        spec = TaskSpec(domain, name, factory, tags, summary, draws)
+        spec = TaskSpec(domain, name, factory, tuple(tags), summary, draws)
         for listener in _listeners:
-            listener(spec)
+            listener.check(spec)
+        for listener in _listeners:
+            listener.add(spec)
         _TASKS[domain, name] = spec
         return factory
 
@@ -129,13 +150,13 @@ def env_id(name: str) -> str:
 
 def _check_name(domain: str, name: str) -> None:
     """Raise `ValueError` for a task that no front door could tell from the others."""
-    if (domain, name) in _TASKS:
-        raise ValueError(f"task {domain}/{name} is registered already")
     for what, word in (("domain", domain), ("name", name)):
-        if not _WORDS.fullmatch(word):
+        if not isinstance(word, str) or not _WORDS.fullmatch(word):
             raise ValueError(
                 f"task {domain}/{name}: the {what} is {word!r}; expected lower case words joined by _"
             )
+    if (domain, name) in _TASKS:
+        raise ValueError(f"task {domain}/{name} is registered already")
     for known in _TASKS.values():
         if env_id(known.name) == env_id(name):
             raise ValueError(
@@ -144,11 +165,17 @@ def _check_name(domain: str, name: str) -> None:
             )
 
 
-def on_registration(listener: Callable[[TaskSpec], None]) -> None:
-    """Tell the listener of every task that is registered, and of each that will be; once only."""
+def on_registration(listener: Listener) -> None:
+    """Tell the listener of every task that is registered, and of each that will be; once only.
+
+    Raises:
+      ValueError: It cannot take one of them; it is told of none then.
+    """
     if listener not in _listeners:
         for spec in _TASKS.values():
-            listener(spec)
+            listener.check(spec)
+        for spec in _TASKS.values():
+            listener.add(spec)
         _listeners.append(listener)
 
 

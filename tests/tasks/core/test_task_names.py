@@ -49,10 +49,30 @@ def test_evaluate_takes_patterns(monkeypatch, tmp_path, capsys):
         ("mine", "pick up", "the name is 'pick up'; expected lower case words"),
         ("mine/x", "slashed", "the domain is 'mine/x'; expected lower case words"),
         ("single_object", "target_pose", "registered already"),
+        ("mine", 5, "the name is 5; expected lower case words"),
+        (None, "named", "the domain is None; expected lower case words"),
     ],
 )
 def test_names_that_a_front_door_cannot_tell_apart_are_refused(domain, name, said):
     before = suite.ALL_TASKS
     with pytest.raises(ValueError, match=said):
         register_task(domain, name)(lambda env_config: None)
+    assert before == suite.ALL_TASKS
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"tags": "rigid"}, "tags is 'rigid'; expected a tuple of words"),
+        ({"tags": ("rigid", 5)}, "tags is .*; expected a tuple of words"),
+        ({"draws": ()}, "draws is .*; expected a function"),
+    ],
+)
+def test_options_of_a_task_of_other_kinds_are_refused(options, said):
+    def factory(env_config):
+        """Nothing to do."""
+
+    before = suite.ALL_TASKS
+    with pytest.raises(ValueError, match=f"^task mine/own: {said}"):
+        register_task("mine", "own", **options)(factory)
     assert before == suite.ALL_TASKS
