@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import math
 import types
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, Unpack
@@ -12,7 +14,7 @@ import dm_env
 import numpy as np
 from dm_control import composer
 
-from manipose_mj.errors import unknown_name
+from manipose_mj.errors import InputError, brief, unknown_name
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
 from manipose_mj.tasks.core.config import PRIMITIVE, EnvConfig, EnvOptions, check_seed, env_config
 from manipose_mj.tasks.core.environment import TaskEnvironment
@@ -48,13 +50,13 @@ def load(
       domain: `"single_object"`, `"clutter"`, `"articulated"`, or one of your own.
       task: A task of that domain, as in `ALL_TASKS`.
       seed: Of the environment's one random state; episodes follow from it.
-      environment_kwargs: More arguments of `composer.Environment`.
+      environment_kwargs: More arguments of `composer.Environment`, such as `time_limit` [s].
       **config: Fields of `EnvConfig`: `obs_mode`, `control_mode`, `reward_mode`, `objects`, `split`,
         `randomisation`, `sensors`, `latency`.
 
     Raises:
       InputError: An unknown task, observation or control mode, objects that the task cannot use, a number that is no
-        seed, or an argument that `composer.Environment` does not have.
+        seed, or an argument that `composer.Environment` does not have or that `seed` stands for.
     """
     spec = task_spec(domain, task)
     return make(env_config(spec.full_name, config), seed, environment_kwargs=environment_kwargs)
@@ -68,13 +70,25 @@ def make(
 ) -> composer.Environment:
     """The environment that a configuration describes; arguments as for `load`."""
     spec = named_task(config.task)
-    known = inspect.signature(composer.Environment).parameters
-    for name in environment_kwargs or {}:
-        if name not in known:
-            raise unknown_name("argument of an environment", name, known)
+    _check_arguments({} if environment_kwargs is None else environment_kwargs)
     if seed is not None and not isinstance(seed, np.random.RandomState):
         check_seed(seed)
     return _made(spec, config, seed, environment_kwargs or {})
+
+
+def _check_arguments(given: Any) -> None:
+    if not isinstance(given, Mapping):
+        raise InputError(f"environment_kwargs is {brief(given)}; expected a mapping of names")
+    known = inspect.signature(composer.Environment).parameters.keys() - {"task", "random_state"}
+    for name in given:
+        if name == "random_state":
+            raise InputError("environment_kwargs has random_state; give it as seed")
+        if name not in known:
+            raise unknown_name("argument of an environment", name, known)
+    limit = given.get("time_limit", math.inf)
+    number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
+    if not number or not limit > 0:
+        raise InputError(f"time_limit is {brief(limit)} s; expected a number above 0")
 
 
 def _made(

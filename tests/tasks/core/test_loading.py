@@ -89,6 +89,23 @@ def test_the_time_limit_ends_the_episode():
         load(*STORE, seed=0, environment_kwargs={"time_limits": 0.1})
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"random_state": 3}, "environment_kwargs has random_state; give it as seed"),
+        ({"task": None}, "unknown argument of an environment 'task'"),
+        ({"self": None}, "unknown argument of an environment 'self'"),
+        ({"time_limit": float("nan")}, "time_limit is nan s; expected a number above 0"),
+        ({"time_limit": -1}, "time_limit is -1 s; expected a number above 0"),
+        ({"time_limit": "a"}, "time_limit is 'a' s; expected a number above 0"),
+        ("time_limit", "environment_kwargs is 'time_limit'; expected a mapping of names"),
+    ],
+)
+def test_arguments_of_an_environment_that_cannot_be_are_one_line(arguments, said):
+    with pytest.raises(InputError, match=said):
+        load(*TARGET_POSE, seed=0, environment_kwargs=arguments)
+
+
 def test_dm_control_knows_the_tasks_once_registered(monkeypatch):
     manipose_mj.register_suite()
     manipose_mj.register_suite()
