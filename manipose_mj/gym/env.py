@@ -13,10 +13,10 @@ from gymnasium.wrappers.utils import rescale_box
 
 from manipose_mj import suite
 from manipose_mj.actions import checked_action
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, brief, unknown_name
 from manipose_mj.gym.spaces import action_box, observation_space
 from manipose_mj.gym.view import View
-from manipose_mj.tasks.core.config import EnvOptions, EpisodeSpec, check_seed, env_config
+from manipose_mj.tasks.core.config import PRIMITIVE, EnvOptions, EpisodeSpec, check_seed, env_config
 from manipose_mj.tasks.core.registry import TaskSpec, named_task
 from manipose_mj.tasks.goals import Goal, success
 from manipose_mj.tasks.instructions.sentence import instruction
@@ -81,7 +81,11 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         }
         self._arguments: dict[str, Any] = {"task": spec, **own, **config}
         self.render_mode = render_mode
-        self.environment = suite.make(env_config(spec.full_name, config))
+        asked = env_config(spec.full_name, config)
+        self.environment = suite.make(asked)
+        self._primitive = (
+            asked.control_mode == PRIMITIVE
+        )  # the task's own mode is then that of its motions
         self.observation_space = observation_space(self.environment.observation_spec())
         self.action_space = action_box(self.environment.action_spec())
         self._unscaled: Callable[[np.ndarray], np.ndarray] | None = None
@@ -138,8 +142,8 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         self._require_open()
         if not self._running:
             raise ResetNeeded("the episode is over, or none was started: call reset first")
-        mode, shape = self.environment.task.control_mode, self.environment.action_spec().shape
-        action = checked_action(mode.name, shape, action)
+        mode = PRIMITIVE if self._primitive else self.environment.task.control_mode.name
+        action = checked_action(mode, self.environment.action_spec().shape, action)
         if self._unscaled is not None:
             action = self._unscaled(action)
         step = self.environment.step(action)
@@ -186,14 +190,26 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
 
         Args:
           state: Of this task's scene, of any episode.
-          goals: Instead of this episode's: for relabelling with goals that were reached.
+          goals: Instead of this episode's: for relabelling with goals that were reached; at least one.
+
+        Raises:
+          InputError: `goals` is no tuple of goals, or an empty one.
         """
         tolerance = self.environment.task.config.tolerance
-        return bool(success(goals or self.goals, state, tolerance))
+        return bool(success(self._goals(goals), state, tolerance))
 
     def reward_of(self, state: SceneState, goals: tuple[Goal, ...] | None = None) -> float:
         """The reward, of this environment's mode, that a state gives; arguments as for `is_success`."""
-        return self.environment.task.reward_of(state, goals or self.goals)
+        return self.environment.task.reward_of(state, self._goals(goals))
+
+    def _goals(self, goals: Any) -> tuple[Goal, ...]:
+        """This episode's goals, or those that are to take their place."""
+        if goals is None:
+            return self.goals
+        several = isinstance(goals, tuple | list) and len(goals) > 0
+        if not several or not all(isinstance(goal, Goal) for goal in goals):
+            raise InputError(f"goals is {brief(goals)}; expected a tuple of goals, at least one")
+        return tuple(goals)
 
     def _show(self) -> None:
         if self.render_mode == "human":

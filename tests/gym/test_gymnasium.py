@@ -46,6 +46,28 @@ def test_the_checker_is_content_with_control_modes(mode):
     _check(gymnasium.make(ID, control_mode=mode, **options).unwrapped)
 
 
+def test_a_wrong_action_is_told_with_the_control_mode_that_was_chosen():
+    env = ManiPoseEnv(
+        "single_object/target_pose", control_mode="primitive", obs_mode="state", objects=OBJECTS
+    )
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="; primitive expects 8 finite numbers"):
+        env.step(np.zeros(3))
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        ("target_pose", "^unknown task 'target_pose'; did you mean .*single_object/target_pose"),
+        (None, '^task is None; expected "domain/name"'),
+    ],
+)
+def test_what_is_no_name_of_a_task_is_told_as_it_was_given(task, said):
+    with pytest.raises(InputError, match=said):
+        ManiPoseEnv(task)
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("mode", MODES)
 def test_the_checker_is_content_with_observation_modes(mode):
@@ -215,6 +237,15 @@ def test_success_and_reward_are_functions_of_a_state(env):
     np.testing.assert_allclose(
         info["goal_error"][0], env.environment.task.goal_error(env.environment.physics)[0]
     )
+
+
+@pytest.mark.parametrize("goals", [(), [None], PoseGoal("object", np.eye(4))])
+def test_goals_that_are_none_are_not_taken_for_the_episodes_own(env, goals):
+    env.reset(seed=1)
+    state = env.scene_state()
+    for function in (env.is_success, env.reward_of):
+        with pytest.raises(InputError, match="expected a tuple of goals, at least one"):
+            function(state, goals)
 
 
 def test_spaces_follow_the_specifications():

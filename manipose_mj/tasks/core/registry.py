@@ -212,7 +212,11 @@ def named_task(full_name: str) -> TaskSpec:
     Raises:
       InputError: There is none; the nearest names are offered.
     """
-    domain, _, name = full_name.partition("/")
+    if not isinstance(full_name, str):
+        raise InputError(f'task is {brief(full_name)}; expected "domain/name"')
+    domain, slash, name = full_name.partition("/")
+    if not slash:
+        raise unknown_name("task", full_name, ("/".join(task) for task in _TASKS))
     return task_spec(domain, name)
 
 
