@@ -28,7 +28,7 @@ from manipose_mj.demos.layout import (
     writing,
 )
 from manipose_mj.errors import InputError, worker_deaths
-from manipose_mj.storage.staging import clear_staging, staging
+from manipose_mj.storage.staging import clear_staging, made_for_result, staging
 
 if TYPE_CHECKING:
     import h5py
@@ -140,7 +140,7 @@ def replay(
     if path.exists() and before is None:
         raise InputError(f"{path}: is there already; add --resume or choose another --out")
     clear_staging(path.parent)
-    with staging(path.parent / "replay") as parts:
+    with made_for_result(path.parent), staging(path.parent / "replay") as parts:
         first = 0 if before is None else before.replayed
         results = _all(replace(demos, episodes=demos.episodes[first:]), config, parts, on_progress)
         kept = [each.now for each in results if each.now is not None]

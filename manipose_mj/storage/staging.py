@@ -33,6 +33,24 @@ def staging(folder: Path) -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
+@contextmanager
+def made_for_result(folder: Path) -> Iterator[None]:
+    """Make a folder and those above it; where no result follows, what is new and empty of them goes again.
+
+    Raises:
+      OSError: It cannot be made.
+    """
+    new = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except BaseException:
+        for each in new:
+            with contextlib.suppress(OSError):  # something is in it
+                each.rmdir()
+        raise
+
+
 def clear_staging(parent: Path) -> None:
     """Remove what `staging` made in `parent` for processes that were killed since."""
     for path in parent.glob(f"{PREFIX}*"):

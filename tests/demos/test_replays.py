@@ -67,6 +67,18 @@ def test_a_resumed_replay_leaves_out_what_is_whole(copied, demos, tmp_path, caps
         replayed_before(replace(demos, episodes=demos.episodes[:1]), asked)
 
 
+def test_a_refused_replay_leaves_no_folder(demos, tmp_path, monkeypatch):
+    def refusing(*arguments):
+        raise InputError("pd_ee_delta_pos: cannot turn the hand")
+
+    monkeypatch.setattr("manipose_mj.demos.replay.replay_one", refusing)
+    (tmp_path / "there").mkdir()
+    for out in (tmp_path / "there", tmp_path / "new" / "deeper"):
+        with pytest.raises(InputError, match="cannot turn the hand"):
+            replay(demos, ReplayConfig("", "pd_ee_delta_pos", out))
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+
+
 @pytest.mark.full
 def test_a_replay_adds_observations_and_converts(demos, tmp_path):
     asked = ReplayConfig("state+pose", "pd_ee_delta_pose", tmp_path)
