@@ -79,15 +79,21 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
     kind = document.text("kind", "rigid", "articulated")
     if not (folder / MODEL_FILE).is_file():
         raise InputError(f"{folder / MODEL_FILE}: missing; an asset folder needs its MJCF model")
+    name = document.text("name")
+    if not name or "/" in name:
+        raise document.wrong("name", "a name without /")
     stable = tuple(_stable_pose(fields) for fields in document.each("stable_poses"))
+    grasps = folder / GRASPS_FILE if file == ASSET_FILE else None
+    if not stable and grasps is not None and grasps.is_file():
+        raise document.wrong("stable_poses", f"the poses that {GRASPS_FILE} speaks of")
     provenance = document.fields("provenance")
     return Asset(
         folder=folder,
-        name=document.text("name"),
+        name=name,
         kind=kind,
         category=document.text("category"),
         label=read_label(document.fields("label")),
-        up=document.array("up", 3),
+        up=document.unit("up", 3),
         mass_properties=_mass_properties(document.fields("mass_properties")),
         stable_poses=stable,
         provenance=Provenance(
@@ -99,7 +105,7 @@ def read_asset(folder: Path | str, file: str = ASSET_FILE) -> Asset:
         ),
         parts=tuple(_part(fields) for fields in document.each("parts")),
         areas=tuple(_area(fields) for fields in document.each("areas")),
-        grasps=read_grasps(folder / GRASPS_FILE, len(stable)) if file == ASSET_FILE else None,
+        grasps=None if grasps is None else read_grasps(grasps, len(stable)),
         label_quality=read_quality(document.optional("label_quality")),
     )
 

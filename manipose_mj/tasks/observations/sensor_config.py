@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, check_count, unknown_name
 from manipose_mj.mjcf.cameras.depth_noise import KINECT, StructuredLight, is_number
 from manipose_mj.mjcf.cameras.pictures import ENGINES, Engine
 from manipose_mj.tasks.observations.fixed_error import FixedError
@@ -107,9 +107,7 @@ class SensorConfig:
 
     def __post_init__(self) -> None:
         for name in ("height", "width", "cloud_size", "object_cloud_size"):
-            value = getattr(self, name)
-            if not isinstance(value, int | np.integer) or value < 1:
-                raise InputError(f"sensors: {name} is {value!r}; expected a positive whole number")
+            check_count(f"sensors: {name}", getattr(self, name), least=1)
         for name in ("height", "width"):
             if getattr(self, name) > MAX_PIXELS:
                 raise InputError(

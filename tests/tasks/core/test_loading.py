@@ -55,6 +55,7 @@ def test_unknown_tasks_are_refused_with_the_nearest_names(domain, task, near):
         ({"cameras": ("frnt",)}, "front"),
         ({"cameras": ("wrist",)}, "panda/wrist"),
         ({"height": 0}, "height"),
+        ({"height": True}, "height is True; expected a whole number, at least 1"),
         ({"width": -4}, "width"),
         ({"cloud_size": 0}, "cloud_size"),
     ],
