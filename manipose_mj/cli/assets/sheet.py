@@ -104,9 +104,12 @@ def _cell(entry: Path | tuple[str, int], size: int) -> Cell:
     """Of an asset folder, or of a built-in object by category and index."""
     from manipose_mj.assets.asset_json import read_asset
     from manipose_mj.assets.catalogue import draft
+    from manipose_mj.assets.model_file import check_model
 
     if isinstance(entry, Path):
-        return _drawn(read_asset(entry), size)
+        asset = read_asset(entry)
+        check_model(asset)
+        return _drawn(asset, size)
     with tempfile.TemporaryDirectory(prefix="manipose-sheet-") as folder:
         return _drawn(draft(*entry, Path(folder)), size)
 

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 import tests.asset_pipeline.labelled_assets as made
+from manipose_mj.assets.asset import MODEL_FILE
 from manipose_mj.assets.catalogue import draft
 from manipose_mj.cli.main import main
 from manipose_mj.mjcf.views.contact_sheet import Cell, contact_sheet
@@ -84,6 +85,15 @@ def test_command_draws_a_sheet_a_category(tmp_path, capsys, monkeypatch):
     assert Image.open(out / "box.png").width > 48
     assert main([*command, "--category", "cabinett"]) == 2
     assert "unknown category 'cabinett'; did you mean cabinet?" in capsys.readouterr().err
+
+
+def test_a_model_without_geoms_is_one_line(tmp_path, capsys):
+    made.block(tmp_path / "assets" / "one")
+    (tmp_path / "assets" / "one" / MODEL_FILE).write_text("<mujoco/>")
+    command = ["assets", "sheet", str(tmp_path / "assets"), "--out", str(tmp_path / "sheets")]
+    assert main([*command, "--jobs", "1"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith(f"one/{MODEL_FILE}: has no body with a geom")
 
 
 def test_command_without_a_folder_says_what_it_is_about_to_draw(tmp_path, capsys, monkeypatch):
