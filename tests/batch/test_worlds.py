@@ -360,26 +360,6 @@ def test_what_cannot_be_is_refused_in_one_line(worlds):
             worlds.step(state, np.zeros((3, 8)), hold)
 
 
-def test_too_many_worlds_for_the_memory_are_refused_before_they_are_made(worlds, monkeypatch):
-    pages = {"SC_PHYS_PAGES": 1000, "SC_PAGE_SIZE": 4096}
-    with monkeypatch.context() as patch:
-        patch.setattr("os.sysconf", pages.get)
-        with pytest.raises(InputError, match=r"^9000 worlds of this task take about \d+ GB of mem"):
-            batch.from_pool(worlds.pool, 9000, "c")
-
-    def refuse(model: Any) -> Any:
-        raise mujoco.FatalError("Could not allocate memory")
-
-    simulator = Simulator(worlds.pool, 3)
-    with monkeypatch.context() as patch:
-        patch.setattr(mujoco, "MjData", refuse)
-        with pytest.raises(
-            InputError, match="^world 1 of 3: no memory for 67 MB more of addresses"
-        ):
-            simulator._begin(1, 0)
-    simulator.close()
-
-
 def test_without_a_gpu_one_line_says_what_is_missing():
     if jax.default_backend() == "gpu":
         pytest.skip("there is one")

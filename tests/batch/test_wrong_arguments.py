@@ -8,11 +8,13 @@ from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 
 from manipose_mj import batch
 from manipose_mj.batch.perception.cameras import Cameras
+from manipose_mj.batch.simulator import Simulator
 from manipose_mj.errors import InputError
 from tests.batch.batched import make, wandering
 
@@ -135,3 +137,23 @@ def test_states_of_equal_worlds_share_what_is_compiled(worlds, state):
     np.testing.assert_array_equal(opening(state), opening(again.at([7, 8, 7])))
     assert len(traced) == 1
     again.close()
+
+
+def test_too_many_worlds_for_the_memory_are_refused_before_they_are_made(worlds, monkeypatch):
+    pages = {"SC_PHYS_PAGES": 1000, "SC_PAGE_SIZE": 4096}
+    with monkeypatch.context() as patch:
+        patch.setattr("os.sysconf", pages.get)
+        with pytest.raises(InputError, match=r"^9000 worlds of this task take about \d+ GB of mem"):
+            batch.from_pool(worlds.pool, 9000, "c")
+
+    def refuse(model: Any) -> Any:
+        raise mujoco.FatalError("Could not allocate memory")
+
+    simulator = Simulator(worlds.pool, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr(mujoco, "MjData", refuse)
+        with pytest.raises(
+            InputError, match="^world 1 of 3: no memory for 67 MB more of addresses"
+        ):
+            simulator._begin(1, 0)
+    simulator.close()

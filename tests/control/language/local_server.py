@@ -6,6 +6,25 @@ import json
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
+from manipose_mj.control.language.description import scene_text
+from manipose_mj.control.language.destinations import named_destinations
+from manipose_mj.control.language.endpoint import EndpointModel
+from manipose_mj.control.language.planner import LanguagePlanner
+from manipose_mj.control.language.reply import reply_schema
+from tests.control.language.scenes import kitchen
+
+KEY = "sk-secret-of-this-test"
+GOOD = json.dumps(
+    {
+        "plan": [
+            {"primitive": "grasp_at", "subject": "top_drawer"},
+            {"primitive": "move_to", "subject": "top_drawer", "opening": 0.19},
+            {"primitive": "release", "subject": "top_drawer"},
+        ],
+        "refusal": "",
+    }
+)
+
 
 class Server:
     """Answers with one behaviour after the other; remembers what it was asked."""
@@ -58,3 +77,21 @@ def send(handler: BaseHTTPRequestHandler, code: int, body: str, **headers) -> No
         handler.send_header(name.replace("_", "-"), value)
     handler.end_headers()
     handler.wfile.write(body.encode())
+
+
+def refuses(parameter: str, message: str = ""):
+    """Answers as an endpoint that does not take a parameter."""
+    words = message or f"Unsupported value: '{parameter}' does not support this"
+    body = json.dumps({"error": {"message": words, "param": parameter, "code": "unsupported"}})
+    return lambda handler: send(handler, 400, body)
+
+
+def asked(server: Server, tmp_path, *, timeout: float = 20.0, retries: int = 1):
+    """What comes of an instruction, and the file of exchanges."""
+    estimate, path = kitchen(), tmp_path / "exchanges.jsonl"
+    model = EndpointModel("m", server.url, timeout=timeout, retries=retries)
+    planner = LanguagePlanner(model, "Open the top drawer.", path)
+    destinations = named_destinations((), estimate)
+    messages = planner.question(scene_text(estimate, destinations))
+    schema = reply_schema(estimate, destinations)
+    return lambda: planner.steps(messages, schema, estimate, destinations), path
