@@ -92,14 +92,14 @@ class PieceDraw(FurnitureDraw):
 
 
 def furniture_alone(requested: RequestedFurniture) -> ObjectDrawFactory:
-    """A draw for tasks that move a part and need nothing else."""
+    """A draw for tasks that move a part and need nothing else; it skips rigid assets, unless there are no others."""
 
     def make(env_config: EnvConfig) -> PieceDraw:
-        for asset in env_config.assets() or ():
-            if asset.kind != "articulated":
-                raise InputError(
-                    f"{asset.place}: is a {asset.kind} asset; tasks that open or close take articulated ones"
-                )
+        assets = env_config.assets() or ()
+        if assets and all(asset.kind != "articulated" for asset in assets):
+            raise InputError(
+                f"{assets[0].place}: is a {assets[0].kind} asset; tasks that open or close take articulated ones"
+            )
         return PieceDraw(requested, env_config, hollow=False)
 
     return make

@@ -203,6 +203,29 @@ def test_evaluations_take_every_piece_of_furniture_with_all_its_parts(name):
         assert drawn.part == spec.part and drawn.assets[0].name == spec.furniture
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "articulated/open_cabinet_door",
+        "articulated/close_top_drawer",
+        "articulated/store_cabinet_door",
+        "articulated/take_out_top_drawer",
+        "clutter/pick",
+        "single_object/target_pose",
+    ],
+)
+def test_a_mixture_of_furniture_and_rigid_objects_serves_every_kind_of_task(name):
+    mixture = ("mug_000", "cabinet_000", *few("clutter/pick"))
+    scenes = SceneSource(named_task(name), EnvConfig(name, objects=mixture))
+    for seed in range(3):
+        drawn = scenes.draw(np.random.RandomState(seed), EpisodeSpec())
+        kinds = {asset.kind for asset in drawn.assets}
+        assert ("articulated" in kinds) == name.startswith("articulated")
+        assert ("rigid" in kinds) == (
+            not name.startswith(("articulated/open", "articulated/close"))
+        )
+
+
 @pytest.mark.full
 @pytest.mark.timeout(900)  # 56 objects are built where none was before
 def test_objects_of_every_category_can_be_played():
