@@ -35,18 +35,13 @@ from manipose_mj.evaluation.protocol.frozen import (
 )
 from manipose_mj.evaluation.protocol.own_assets import BuiltAsset, built_assets
 from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+from manipose_mj.tasks.articulated.registered import OPENABLES
 from manipose_mj.tasks.clutter.object_draw import require_fit_for_piles
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import TaskSpec, all_tasks, task_spec
 from manipose_mj.tasks.core.scene_source import SceneSource
 from manipose_mj.tasks.scene.resting import require_graspable
 
-# Categories of the data sets' furniture for the tasks with a word in their name, the first that fits.
-_FURNITURE = {
-    "microwave": ("microwave",),
-    "oven": ("oven", "dishwasher"),
-    "": ("cabinet", "table", "refrigerator"),
-}
 # With a user's objects it stores any of them, as `store_middle_drawer` does.
 _SAME_WITH_SCANS = ("articulated/store_chips_can_middle_drawer",)
 
@@ -179,7 +174,7 @@ def pool_for(spec: TaskSpec, assets: Sequence[Asset]) -> list[Asset]:
     rigid = [each for each in assets if each.graspable is not False and _meets(require, each)]
     if "articulated" not in spec.tags:
         return rigid
-    kinds = next(kinds for word, kinds in _FURNITURE.items() if word in spec.full_name)
+    kinds = next(each.requested.own for part, each in OPENABLES.items() if spec.name.endswith(part))
     pieces = [
         each
         for each in assets

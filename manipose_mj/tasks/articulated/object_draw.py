@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,6 +25,8 @@ from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects, Strata
 from manipose_mj.tasks.scene.resting import require_graspable
 
+log = logging.getLogger(__name__)
+
 _PIECES = 30  # that are looked at for one with a cavity that something fits
 
 
@@ -35,11 +38,14 @@ class RequestedFurniture:
       categories: Of built-in furniture.
       choice: Of the parts.
       stored: Categories of built-in objects that are stored; None: every rigid one.
+      own: Categories of a user's furniture that are preferred; pieces of others serve where none of these has such a
+        part. Empty: all alike.
     """
 
     categories: tuple[str, ...]
     choice: PartChoice
     stored: tuple[str, ...] | None = None
+    own: tuple[str, ...] = ()
 
 
 class FurnitureDraw:
@@ -54,11 +60,24 @@ class FurnitureDraw:
         rows = [CATALOGUE[name] for name in requested.categories]
         pool = own or builtin(env_config.split, rows)
         self._parts = partial(possible_parts, choice=choice, hollow=hollow)
+        self._named = Candidates(pool, self._parts)
+        preferred = [each for each in own if each.category in requested.own]
+        if preferred and Candidates(preferred, self._parts).usable():
+            pool = preferred
+        elif requested.own and own and self._named.usable():
+            log.warning(
+                "%s: no %s has a part for it; it draws from all furniture that was chosen",
+                env_config.task,
+                " or ".join(requested.own),
+            )
         self.pieces = Candidates(pool, self._parts)
 
     def draw(self, rng: np.random.RandomState, spec: EpisodeSpec) -> tuple[Asset, MovingPart]:
         """Raises InputError where no piece has such a part, or none of the names asked for."""
-        asset = self.pieces.draw(rng, spec.furniture)
+        if spec.furniture is None:
+            asset = self.pieces.draw(rng)
+        else:
+            asset = self._named.draw(rng, spec.furniture)
         possible = self._parts(asset)
         if spec.part is None:
             return asset, possible[rng.randint(len(possible))]

@@ -20,6 +20,7 @@ from manipose_mj.tasks.core.registry import DrawnTaskFactory, register_task
 from manipose_mj.tasks.core.scene_objects import SceneObjects
 
 _ANY_CABINET = ("cabinet",)
+_OWN_CABINET = ("cabinet", "table", "refrigerator")  # of users: what has drawers and upright doors
 # How many other objects may lie in a cavity when something is stored there, and when it is taken out.
 _STORED_BESIDE, _LEFT_INSIDE = 2, 1
 # Things rock on an oven's grid and on the rim of a turntable [s].
@@ -27,7 +28,7 @@ _SETTLE_INSIDE = 2.0
 # A door half open would be where the hand is at home.
 _PAST_HOME = (0.9, 1.0)
 _CANS_IN_DRAWERS = RequestedFurniture(
-    _ANY_CABINET, PartChoice(("drawer",), "middle"), ("chips_can",)
+    _ANY_CABINET, PartChoice(("drawer",), "middle"), ("chips_can",), own=_OWN_CABINET
 )
 
 
@@ -71,7 +72,7 @@ OPENABLES: dict[str, Openable] = {
     **{
         f"{level}_drawer": Openable(
             f"the {level} drawer of a cabinet",
-            RequestedFurniture(_ANY_CABINET, PartChoice(("drawer",), level)),
+            RequestedFurniture(_ANY_CABINET, PartChoice(("drawer",), level), own=_OWN_CABINET),
             # The hand gets at a handle from the front only with room below.
             replace(_BESIDE, plinth=(0.15, 0.15) if level == "bottom" else (0.0, 0.0)),
             # Wide open, the top drawer would be where the hand is at home.
@@ -82,21 +83,21 @@ OPENABLES: dict[str, Openable] = {
     "cabinet_door": Openable(
         "a door of a cabinet",
         # Doors that lift are real cupboards' alone.
-        RequestedFurniture(_ANY_CABINET, PartChoice(("door", "flap"))),
+        RequestedFurniture(_ANY_CABINET, PartChoice(("door", "flap")), own=_OWN_CABINET),
         _BEFORE,
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "microwave": Openable(
         "a microwave",
-        RequestedFurniture(("microwave",), PartChoice(("door", "flap"))),
+        RequestedFurniture(("microwave",), PartChoice(("door", "flap")), own=("microwave",)),
         replace(_BEFORE, plinth=(0.10, 0.10)),
         start_open=_PAST_HOME,
         shut=0.95,
     ),
     "oven": Openable(
         "an oven, whose door is hinged at the bottom",
-        RequestedFurniture(("oven",), PartChoice(("flap", "door"))),
+        RequestedFurniture(("oven",), PartChoice(("flap", "door")), own=("oven", "dishwasher")),
         replace(_BEFORE, bearing=(-0.07, 0.07), turn=(-0.17, 0.17), plinth=(0.12, 0.12)),
         shut=0.95,
     ),

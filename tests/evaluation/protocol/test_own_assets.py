@@ -18,7 +18,7 @@ from manipose_mj.evaluation.config import EvaluationConfig
 from manipose_mj.evaluation.protocol import frozen, own_assets
 from manipose_mj.evaluation.protocol.freeze import document_of_assets, pool_for
 from manipose_mj.evaluation.runner import evaluate
-from manipose_mj.tasks.core.config import EpisodeSpec
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import task_spec
 from manipose_mj.tasks.core.scene_source import SceneSource
 
@@ -149,3 +149,17 @@ def test_a_frozen_list_draws_the_same_objects_from_other_folders(tmp_path):
         asked = EpisodeSpec(seed=entry["seed"], object=entry["object"])
         drawn = scenes.draw(np.random.RandomState(entry["seed"]), asked)
         assert [asset.name for asset in drawn.assets] == entry["objects"]
+
+
+def test_the_data_sets_furniture_of_a_task_is_what_it_draws_with_a_users():
+    """Nothing that is frozen is left out by the preference for kinds."""
+    cabinet = catalogue.load("cabinet", 0)
+    scans = [
+        replace(cabinet, name=name, category=name)
+        for name in ("cabinet", "table", "refrigerator", "microwave", "oven", "dishwasher", "safe")
+    ]
+    for task in (name for name in REAL["tasks"] if name.startswith("articulated/open")):
+        spec = task_spec(*task.split("/"))
+        pool = {asset.name for asset in pool_for(spec, scans)}
+        groups = SceneSource(spec, EnvConfig(task, objects=scans)).strata()
+        assert {each.furniture for group in groups for each in group} == pool

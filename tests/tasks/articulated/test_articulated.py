@@ -93,6 +93,45 @@ def test_a_users_piece_has_a_middle_drawer_whatever_its_layout():
         assert [[spec.part for spec in group] for group in scenes.strata()] == [[expected]]
 
 
+def _as(category: str, name: str):
+    """A cabinet under another category and name."""
+    return replace(catalogue.load("cabinet", 0), category=category, name=name)
+
+
+def _pieces(task: str, *objects) -> set[str]:
+    own = EnvConfig(f"articulated/{task}", objects=objects)
+    scenes = SceneSource(named_task(own.task), own)
+    drawn = [scenes.draw(np.random.RandomState(seed), EpisodeSpec()) for seed in range(12)]
+    names = {scene.assets[0].name for scene in drawn if scene is not None}
+    assert names == {spec.furniture for group in scenes.strata() for spec in group}
+    return names
+
+
+@pytest.mark.parametrize("verb", ["open", "take_out"])
+def test_a_users_furniture_of_the_kind_that_a_task_is_named_for_comes_first(verb, caplog):
+    pieces = [_as(name, name) for name in ("cabinet", "table", "microwave", "dishwasher", "safe")]
+    pieces.append(catalogue.load("mug", 0))
+    assert _pieces(f"{verb}_microwave", *pieces) == {"microwave"}
+    assert _pieces(f"{verb}_oven", *pieces) == {"dishwasher"}
+    assert _pieces(f"{verb}_top_drawer", *pieces) == {"cabinet", "table"}
+    assert not caplog.records
+    own = EnvConfig(f"articulated/{verb}_microwave", objects=pieces)
+    named = SceneSource(named_task(own.task), own).draw(
+        np.random.RandomState(0), EpisodeSpec(furniture="safe")
+    )
+    assert named is not None and named.assets[0].name == "safe"
+
+
+def test_other_furniture_serves_where_none_of_the_kind_has_such_a_part_and_a_warning_says_so(
+    caplog,
+):
+    doorless = replace(_as("microwave", "microwave"), parts=())
+    assert _pieces("open_microwave", doorless, _as("safe", "safe")) == {"safe"}
+    (record,) = caplog.records
+    assert "articulated/open_microwave: no microwave has a part for it" in record.message
+    assert "\n" not in record.message
+
+
 def test_a_part_that_is_not_there_is_refused_with_those_that_are():
     microwave = catalogue.load("microwave", 0)
     with pytest.raises(InputError, match=r"no top drawer with a handle; its parts: door \(door\)"):
