@@ -11,7 +11,7 @@ import numpy as np
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.assets.categories import CATALOGUE, Category, Split
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.tasks.articulated.cavity_placement import (
     hand_towards,
     ways_in_hand,
@@ -19,7 +19,7 @@ from manipose_mj.tasks.articulated.cavity_placement import (
     ways_stored,
 )
 from manipose_mj.tasks.articulated.hand_room import STRAIGHT
-from manipose_mj.tasks.articulated.part_choice import PartChoice, named_part, possible_parts
+from manipose_mj.tasks.articulated.part_choice import PartChoice, possible_parts
 from manipose_mj.tasks.core.candidates import Candidate, Candidates, builtin, chosen, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.scene_objects import ObjectDrawFactory, SceneObjects, Strata
@@ -71,23 +71,44 @@ class FurnitureDraw:
                 " or ".join(requested.own),
             )
         self.pieces = Candidates(pool, self._parts)
+        self._pool = pool
+        self._with_part: dict[str, Candidates] = {}  # by the part's name
 
     def draw(self, rng: np.random.RandomState, spec: EpisodeSpec) -> tuple[Asset, MovingPart]:
         """Raises InputError where no piece has such a part, or none of the names asked for."""
-        if spec.furniture is None:
-            asset = self.pieces.draw(rng)
-        else:
+        if spec.furniture is not None:
             asset = self._named.draw(rng, spec.furniture)
+        elif spec.part is not None:
+            asset = self._piece_with(rng, spec.part)
+        else:
+            asset = self.pieces.draw(rng)
+        if spec.part is not None:
+            return asset, self._part(asset, spec.part)
         possible = self._parts(asset)
-        if spec.part is None:
-            return asset, possible[rng.randint(len(possible))]
-        part = named_part(asset, spec.part)
-        names = [each.name for each in possible]
-        if part.name not in names:
-            raise InputError(
-                f"{asset.place}: this task is about {', '.join(names)}; part {part.name!r} is none of them"
-            )
-        return asset, part
+        return asset, possible[rng.randint(len(possible))]
+
+    def _piece_with(self, rng: np.random.RandomState, name: str) -> Asset:
+        """A piece that has a possible part of a name."""
+        check = partial(self._part, name=name)
+        candidates = self._with_part.setdefault(name, Candidates(self._pool, check))
+        try:
+            return candidates.draw(rng)
+        except InputError:
+            there = {str(spec.part) for group in self.strata() for spec in group}
+            if not there or name in there:
+                raise
+            raise unknown_name("part", name, there) from None
+
+    def _part(self, asset: Asset, name: str) -> MovingPart:
+        """The possible part of an asset that has this name."""
+        possible = {part.name: part for part in self._parts(asset)}
+        if name in possible:
+            return possible[name]
+        if all(part.name != name for part in asset.parts):
+            raise unknown_name(f"part of {asset.name}", name, possible)
+        raise InputError(
+            f"{asset.place}: this task is about {', '.join(possible)}; part {name!r} is none of them"
+        )
 
     def strata(self) -> Strata:
         """Pieces, each with its parts."""

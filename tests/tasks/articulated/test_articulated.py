@@ -148,6 +148,27 @@ def test_a_sliding_door_is_no_drawer():
         possible_parts(replace(asset, parts=(aside,)), PartChoice(("drawer", "door")), hollow=False)
 
 
+def test_a_part_that_is_asked_for_without_a_piece_is_of_a_piece_that_has_it():
+    one = _as("cabinet", "one")
+    renamed = tuple(
+        replace(part, name="door_1") if part.name == "door" else part for part in one.parts
+    )
+    other = replace(one, name="other", parts=renamed)
+    own = EnvConfig("articulated/open_cabinet_door", objects=(one, other))
+    scenes = SceneSource(named_task(own.task), own)
+    for seed in range(8):
+        drawn = scenes.draw(np.random.RandomState(seed), EpisodeSpec(part="door_1"))
+        assert drawn is not None and (drawn.assets[0].name, drawn.part) == ("other", "door_1")
+    for part, piece, message in (
+        ("top", None, "^unknown part 'top'; known: door, door_1$"),
+        ("top_drawer", None, "^unknown part 'top_drawer'; known: door, door_1$"),
+        ("door_1", "one", "^unknown part of one 'door_1'; did you mean door\\?$"),
+        ("top_drawer", "one", "this task is about door; part 'top_drawer' is none of them$"),
+    ):
+        with pytest.raises(InputError, match=message):
+            scenes.draw(np.random.RandomState(0), EpisodeSpec(part=part, furniture=piece))
+
+
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("part", OPENABLES)
 def test_open_is_met_from_nine_tenths_of_the_range_on(part):
