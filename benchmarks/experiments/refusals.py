@@ -23,7 +23,7 @@ from manipose_mj.errors import InputError
 from manipose_mj.evaluation.protocol.freeze import builtin_tasks
 from manipose_mj.tasks.core.candidates import Candidate, builtin, rigid_rows
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
-from manipose_mj.tasks.core.registry import TaskSpec
+from manipose_mj.tasks.core.registry import TaskSpec, tasks_named
 from manipose_mj.tasks.core.scene_source import SceneSource
 
 _OPENS_ALONE = ("open", "close")  # tags of tasks that are about no rigid object
@@ -41,19 +41,29 @@ class Refusal:
 def main() -> None:
     """Print the counts."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--tasks", nargs="+", default=[], help="domain/task; all by default")
+    parser.add_argument(
+        "--tasks", nargs="+", default=["*"], help="names or patterns; all by default"
+    )
     parser.add_argument("--each", type=int, default=0, help="so many of a category; 0: all")
     parser.add_argument("--split", default="test", choices=("train", "test"))
     options = parser.parse_args()
     logging.disable(logging.WARNING)
-    for spec in builtin_tasks():
-        if options.tasks and spec.full_name not in options.tasks:
-            continue
-        if set(_OPENS_ALONE) & set(spec.tags):
-            continue
+    for spec in counted_tasks(options.tasks):
         asked = objects_asked(spec, options.split, options.each)
         refusals = refused(spec, asked, options.split)
         print("\n".join(lines_of(spec.full_name, len(asked), refusals)), flush=True)
+
+
+def counted_tasks(patterns: Sequence[str]) -> list[TaskSpec]:
+    """The tasks of this package with these names or patterns that are about rigid objects.
+
+    Raises:
+      InputError: There is none of a name, or a pattern fits none.
+    """
+    about_objects = {
+        spec.full_name: spec for spec in builtin_tasks() if not set(_OPENS_ALONE) & set(spec.tags)
+    }
+    return [about_objects[name] for name in tasks_named(patterns, about_objects)]
 
 
 def objects_asked(spec: TaskSpec, split: Split, each: int) -> list[Candidate]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from benchmarks.experiments.refusals import Refusal, cause_of, lines_of
+import pytest
+
+from benchmarks.experiments.refusals import Refusal, cause_of, counted_tasks, lines_of
+from manipose_mj.errors import InputError
 
 
 def test_reasons_are_the_same_for_all_objects():
@@ -33,3 +36,13 @@ def test_categories_are_counted_by_reason():
         "  2: wide: pot 2",
         "  1: flat: plate 1",
     ]
+
+
+def test_tasks_are_named_or_fit_a_pattern():
+    names = [spec.full_name for spec in counted_tasks(["single_object/*", "clutter/pick"])]
+    assert "single_object/target_pose" in names and names[-1] == "clutter/pick"
+    assert len(names) == len(set(names)) > 3
+    assert not [s.name for s in counted_tasks(["*"]) if s.name.startswith(("open_", "close_"))]
+    for wrong in ("nope", "articulated/open_oven", "nope/*"):
+        with pytest.raises(InputError):
+            counted_tasks([wrong])
