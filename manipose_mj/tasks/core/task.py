@@ -139,8 +139,15 @@ class ManipulationTask(composer.Task):
 
     @property
     def object(self) -> RigidObject:
-        """The rigid object that this episode is about: the first in play."""
-        return next(iter(self.objects.values()))
+        """The rigid object that this episode is about: the first in play.
+
+        Raises:
+          InputError: There is none in play, as where furniture is opened or closed, or before the first episode.
+        """
+        for entity in self.objects.values():
+            return entity
+        instead = "reset it first" if self.start is None else "it has `articulated_objects` alone"
+        raise InputError(f"task {self.env_config.task}: no rigid object is in play; {instead}")
 
     @property
     def articulated_objects(self) -> tuple[ArticulatedObject, ...]:

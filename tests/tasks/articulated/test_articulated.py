@@ -184,6 +184,16 @@ def test_open_is_met_from_nine_tenths_of_the_range_on(part):
         assert task.part.name in [p.name for p in task.furniture.asset.parts]
 
 
+def test_a_task_without_a_rigid_object_says_so():
+    task = _load("open_microwave").task
+    said = "^task articulated/open_microwave: no rigid object is in play; "
+    with pytest.raises(InputError, match=said + "it has `articulated_objects` alone$"):
+        _ = task.object
+    task.start = None
+    with pytest.raises(InputError, match=said + "reset it first$"):
+        _ = task.object
+
+
 @pytest.mark.parametrize("part", ["top_drawer", "cabinet_door", "oven"])
 def test_close_starts_open_and_is_met_when_shut(part):
     environment = _load(f"close_{part}")
