@@ -154,22 +154,44 @@ def build_item(
             if isinstance(item, MeshItem):
                 where = {PLACE: place(item.file, folder)}
                 provenance = replace(provenance, inputs=provenance.inputs | where)
-            asset = build_scan(replace(scan, provenance=provenance), target, override)
-            if isinstance(item, MeshItem) and override is None:
-                _tell_type(item.options.object_type, asset.label.object_type)
+            said_type = item.options.object_type if isinstance(item, MeshItem) else None
+            asset = build_scan(
+                replace(scan, provenance=provenance),
+                target,
+                override,
+                type_stated=said_type is not None,
+            )
+            if override is None:
+                _tell_type(said_type, asset)
     return True
 
 
-def _tell_type(said: ObjectType | None, found: ObjectType) -> None:
-    """A vessel with a handle has no axis that all of it is round about, whatever is said."""
+def _tell_type(said: ObjectType | None, asset: Asset) -> None:
+    """Warn where the type that a person said does not fit the shape."""
+    found = asset.label.object_type
+    residuals = {} if asset.label_quality is None else asset.label_quality.residuals
+    if said == found == "axial" and "axis" not in residuals:
+        log.warning(
+            "--type axial: no axis of revolution was found; labelled by planes: say --type mirror"
+        )
     if said not in (None, found):
+        # A vessel with a handle has no axis that all of it is round about.
         log.warning(
             "--type %s does not fit what sticks out at its side; labelled as %s", said, found
         )
 
 
-def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> Asset:
-    """Label, decompose and weigh one scan, and write its asset folder."""
+def build_scan(
+    scan: Scan, folder: Path, override: Override | None = None, *, type_stated: bool = False
+) -> Asset:
+    """Label, decompose and weigh one scan, and write its asset folder.
+
+    Args:
+      scan: Its mesh and what is known of it.
+      folder: Of the asset.
+      override: What a person said of its label.
+      type_stated: Whether a person said its type.
+    """
     label, quality = scan_label(
         scan.mesh,
         scan.object_type,
@@ -178,6 +200,7 @@ def build_scan(scan: Scan, folder: Path, override: Override | None = None) -> As
         functional=scan.functional,
         textured=scan.texture is not None,
         texture=scan.texture,
+        stated=type_stated,
     )
     measured = Asset(
         folder=folder,

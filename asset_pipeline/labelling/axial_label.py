@@ -33,6 +33,40 @@ def axial_label(
       cloud: The surface.
       up: `(3,)`, unit, in the mesh frame.
     """
+    rotation, origin, extents = _frame(cloud, up)
+    axis, limit = rotation[:, 0], ROUND.limit(cloud)
+    around = axial_residual(cloud, axis, origin, ROUND.percentile)
+    if around > limit:
+        return None
+    symmetry = measured_symmetry(cloud, rotation, origin, axial=ROUND)
+    turned = rotation @ np.diag([-1.0, 1.0, -1.0]) @ rotation.T
+    flip = residual(cloud, turned, origin)
+    label = PoseLabel(origin, rotation, "axial", extents, symmetry)
+    residuals = {"axis": axial_residual(cloud, axis, origin), "flip": flip}
+    quality = LabelQuality(fits(around, limit), residuals)
+    return label, quality
+
+
+def axis_evidence(cloud: SurfaceCloud, up: Float[np.ndarray, "3"]) -> float:
+    """Evidence from 0 to 1 that a surface is one of revolution; below one half, `axial_label` finds none.
+
+    Args:
+      cloud: The surface.
+      up: `(3,)`, unit, in the mesh frame.
+    """
+    rotation, origin, _ = _frame(cloud, up)
+    around = axial_residual(cloud, rotation[:, 0], origin, ROUND.percentile)
+    return fits(around, ROUND.limit(cloud))
+
+
+def _frame(
+    cloud: SurfaceCloud, up: Float[np.ndarray, "3"]
+) -> tuple[
+    Float[np.ndarray, "3 3"],
+    Float[np.ndarray, "3"],
+    Float[np.ndarray, "3"],
+]:
+    """Axes as columns, origin and extents of the label that a surface of revolution would have."""
     axis, point = half_turn_axis(cloud, up, cloud.points.mean(axis=0))
     axis = axis if axis @ up > 0 else -axis
     if axis @ up < np.cos(MAX_LEAN):
@@ -40,18 +74,7 @@ def axial_label(
     rotation = projected_frame(axis)
     local = (cloud.points - point) @ rotation
     low, high = local.min(axis=0), local.max(axis=0)
-    origin = point + (low[0] + high[0]) / 2 * axis
-    around = axial_residual(cloud, axis, origin, ROUND.percentile)
-    limit = ROUND.limit(cloud)
-    if around > limit:
-        return None
-    symmetry = measured_symmetry(cloud, rotation, origin, axial=ROUND)
-    turned = rotation @ np.diag([-1.0, 1.0, -1.0]) @ rotation.T
-    flip = residual(cloud, turned, origin)
-    label = PoseLabel(origin, rotation, "axial", high - low, symmetry)
-    residuals = {"axis": axial_residual(cloud, axis, origin), "flip": flip}
-    quality = LabelQuality(fits(around, limit), residuals)
-    return label, quality
+    return rotation, point + (low[0] + high[0]) / 2 * axis, high - low
 
 
 def projected_frame(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

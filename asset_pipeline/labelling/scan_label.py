@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.labelling.axial_label import axial_label
+from asset_pipeline.labelling.axial_label import axial_label, axis_evidence
 from asset_pipeline.labelling.mirror_label import mirror_label
 from asset_pipeline.labelling.print_symmetry import print_symmetry, surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
@@ -30,6 +30,7 @@ def scan_label(
     functional: Float[np.ndarray, "3"] | None = None,
     textured: bool = True,
     texture: Path | None = None,
+    stated: bool = False,
 ) -> tuple[PoseLabel, LabelQuality]:
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
@@ -46,6 +47,8 @@ def scan_label(
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
       textured: Whether the asset has a texture, which may break symmetries of the shape.
       texture: Its image, to measure which; without, it is taken to leave turns about an axis only.
+      stated: Whether a person said the type of this object: where it is axial, and the shape has no axis of
+        revolution, that counts against the confidence.
 
     Raises:
       InputError: Another object type, which scans do not have, or no `up` where it is needed.
@@ -60,7 +63,11 @@ def scan_label(
     if up is None or object_type == "functional":
         label, quality = tool_label(cloud, category=category, functional=functional)
     else:
-        label, quality = _upright_label(cloud, object_type, np.asarray(up, float), category)
+        up = np.asarray(up, float) / np.linalg.norm(up)
+        label, quality = _upright_label(cloud, object_type, up, category)
+        if stated and label.object_type == "axial":
+            confidence = min(quality.confidence, axis_evidence(cloud, up))
+            quality = replace(quality, confidence=confidence)
     if textured:
         colours = None if texture is None else surface_colours(cloud, mesh, texture)
         label = replace(label, print_symmetry=print_symmetry(cloud, colours, label))
@@ -70,7 +77,6 @@ def scan_label(
 def _upright_label(
     cloud: SurfaceCloud, object_type: ObjectType, up: Float[np.ndarray, "3"], category: str
 ) -> tuple[PoseLabel, LabelQuality]:
-    up = up / np.linalg.norm(up)
     vessel = vessel_shape(cloud, up)
     if vessel is not None and vessel.parts:
         return vessel_label(cloud, vessel)

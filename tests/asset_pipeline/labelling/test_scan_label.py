@@ -53,9 +53,23 @@ def test_a_leaning_cone_gets_its_own_axis_and_keeps_its_ends_apart():
 
 
 def test_a_box_that_is_said_to_be_axial_is_laid_like_a_box():
-    label, _ = scan_label(trimesh.creation.box(extents=[0.04, 0.06, 0.1]), "axial", UP)
+    label, quality = scan_label(trimesh.creation.box(extents=[0.04, 0.06, 0.1]), "axial", UP)
     assert label.object_type == "axial" and not label.symmetry.axial
     assert _angle(np.abs(label.rotation[:, 1]), np.array([0, 1.0, 0])) < 0.5
+    assert quality.confidence == 1.0  # of a data set's category; its planes are clear
+
+
+@pytest.mark.parametrize(
+    ("solid", "least", "most"),
+    [
+        (trimesh.creation.box(extents=[0.04, 0.06, 0.1]), 0.0, 0.1),
+        (trimesh.creation.cylinder(0.03, 0.1, sections=64), 0.9, 1.0),
+    ],
+    ids=["box", "cylinder"],
+)
+def test_an_axis_that_a_person_states_and_the_shape_lacks_leaves_no_confidence(solid, least, most):
+    _, quality = scan_label(_scan_of(solid), "axial", UP, textured=False, stated=True)
+    assert least <= quality.confidence <= most
 
 
 @pytest.mark.sample(1)

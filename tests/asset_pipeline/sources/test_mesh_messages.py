@@ -201,6 +201,18 @@ def test_a_type_that_does_not_fit_is_told(tmp_path, caplog):
     )
 
 
+def test_an_axis_that_is_not_found_is_told_and_leaves_no_confidence(tmp_path):
+    _box(tmp_path / "tin.stl")
+    said = MeshOptions("tin", "axial", "z", "m", "CC0 1.0")
+    (result,) = build("meshes", tmp_path / "tin.stl", tmp_path / "out", said=said)
+    assert result.status == "built", result.reason
+    asset = read_asset(result.folder)
+    assert asset.label.object_type == "axial" and not asset.label.symmetry.axial
+    assert asset.label_quality is not None and asset.label_quality.confidence < 0.1
+    (told,) = [w for w in result.warnings if "--type" in w]
+    assert told.endswith("no axis of revolution was found; labelled by planes: say --type mirror")
+
+
 @pytest.mark.full
 def test_an_asset_of_a_category_in_another_script_is_drawn(tmp_path, capsys):
     _box(tmp_path / "tea.stl")
