@@ -13,12 +13,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, brief
 from manipose_mj.evaluation.protocol.frozen import Protocol, start_digest
 from manipose_mj.evaluation.records import write_atomically
 
 T = TypeVar("T")
 Key = tuple[str, int]  # a task's full name, and the number of the episode
+_FIELDS = ("version", "solved", "unsolved", "refused")  # of a file
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,19 @@ def load_certificates(protocol: Protocol, path: Path | None = None) -> Certifica
         return Certificates(protocol.version)
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        version = document["version"]
-        solved = _entries(document["solved"], lambda fields: (fields.pop("start"), fields))
-        unsolved = _entries(document["unsolved"], lambda f: (f["start"], f["reason"]))
-        refused = _entries(document["refused"], tuple)
-        certificates = {key: (start, Certificate(**rest)) for key, (start, rest) in solved.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: not a file of certificates ({error})") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except ValueError as error:
+        raise InputError(f"{path}: not a file of certificates; no JSON ({error})") from None
+    try:
+        version = _version(document)
+        certificates = _entries(
+            document, "solved", '{"start", "planner_seed", "plans"}', _start_and_certificate
+        )
+        unsolved = _entries(document, "unsolved", '{"start", "reason"}', _start_and_reason)
+        refused = _entries(document, "refused", "a list of reasons", _reasons)
+    except InputError as error:
+        raise InputError(f"{path}: not a file of certificates; {error}") from None
     if version != protocol.version:
         raise InputError(f"{path}: of protocol {version}, not of {protocol.version}")
     starts = _start_digests(protocol)
@@ -131,12 +138,47 @@ def causes(known: Certificates) -> Counter[tuple[str, str]]:
     return Counter((task, reason.partition(":")[0]) for task, reason in reasons)
 
 
-def _entries(sections: Any, read: Callable[[Any], T]) -> dict[Key, T]:
-    return {
-        (task, int(number)): read(entry)
-        for task, entries in sections.items()
-        for number, entry in entries.items()
-    }
+def _version(document: Any) -> str:
+    if not isinstance(document, dict):
+        raise InputError(f"it is {brief(document)}; expected {', '.join(map(repr, _FIELDS))}")
+    for name in _FIELDS:
+        if name not in document:
+            raise InputError(f"it has no {name!r}; expected {', '.join(map(repr, _FIELDS))}")
+    return document["version"]
+
+
+def _entries(document: Any, table: str, form: str, read: Callable[[Any], T]) -> dict[Key, T]:
+    found: dict[Key, T] = {}
+    sections = document[table]
+    if not isinstance(sections, dict):
+        raise InputError(f"{table!r} is {brief(sections)}; expected tasks with their episodes")
+    for task, entries in sections.items():
+        if not isinstance(entries, dict) or not all(map(str.isdecimal, entries)):
+            raise InputError(
+                f"{table!r}, {task!r} is {brief(entries)}; expected episodes by number"
+            )
+        for number, entry in entries.items():
+            try:
+                found[task, int(number)] = read(entry)
+            except (KeyError, TypeError):
+                raise InputError(
+                    f"{table!r}, {task!r}, {number!r} is {brief(entry)}; expected {form}"
+                ) from None
+    return found
+
+
+def _start_and_certificate(entry: Any) -> tuple[str, Certificate]:
+    return entry["start"], Certificate(entry["planner_seed"], entry["plans"])
+
+
+def _start_and_reason(entry: Any) -> tuple[str, str]:
+    return entry["start"], entry["reason"]
+
+
+def _reasons(entry: Any) -> tuple[str, ...]:
+    if not isinstance(entry, list):
+        raise TypeError
+    return tuple(entry)
 
 
 def _start_digests(protocol: Protocol) -> dict[Key, str]:

@@ -84,11 +84,26 @@ def test_starts_that_nobody_solved_are_drawn_again_in_their_place_and_counted():
     assert again["tasks"][TASK]["episodes"][3]["seed"] == evaluation_seed("v1", TASK, 3, 2)
 
 
+def _document(solved: str, unsolved: str = "{}", refused: str = "{}") -> str:
+    fields = f'"solved": {solved}, "unsolved": {unsolved}, "refused": {refused}'
+    return f'{{"version": "v1", {fields}}}'
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         ("{", "not a file of certificates"),
-        ('{"version": "v1", "solved": {"a": 3}, "unsolved": {}}', "not a file of certificates"),
+        ("[]", r"not a file of certificates; it is \[\]; expected 'version', 'solved', 'unsolved'"),
+        ('{"version": "v1", "solved": {}}', "it has no 'unsolved'; expected 'version', 'solved'"),
+        (_document("[]"), r"'solved' is \[\]; expected tasks with their episodes"),
+        (_document('{"a": 3}'), "'solved', 'a' is 3; expected episodes by number"),
+        (_document('{"a": {"x": {}}}'), "'solved', 'a' is {'x': {}}; expected episodes by number"),
+        (
+            _document('{"a": {"0": {"start": ""}}}'),
+            """'solved', 'a', '0' is {'start': ''}; expected {"start", "planner_seed", "plans"}""",
+        ),
+        (_document("{}", '{"a": {"0": []}}'), "'unsolved', 'a', '0' is .*; expected {\"start\""),
+        (_document("{}", "{}", '{"a": {"0": 1}}'), "'refused', 'a', '0' is 1; expected a list"),
         (
             '{"version": "v0", "solved": {}, "unsolved": {}, "refused": {}}',
             "of protocol v0, not of v1",
