@@ -49,6 +49,11 @@ def draw_sheets(
     from manipose_mj.mjcf.views.contact_sheet import contact_sheet
 
     sheets = _built_in(category) if directory is None else _in_folder(directory, category)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
     total, done = sum(map(len, sheets.values())), 0
     if directory is None:
         hint = "" if category else "; --category NAME draws fewer, DIR the assets of a folder"
@@ -61,7 +66,6 @@ def draw_sheets(
         joblib.delayed(_cell)(entry, size) for entries in sheets.values() for entry in entries
     )  # pyright: ignore[reportAssignmentType]
     try:
-        out.mkdir(parents=True, exist_ok=True)
         with output.Progress("objects") as progress:
             for name, entries in sheets.items():
                 own = []

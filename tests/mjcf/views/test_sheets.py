@@ -96,6 +96,20 @@ def test_a_model_without_geoms_is_one_line(tmp_path, capsys):
     assert line.endswith(f"one/{MODEL_FILE}: has no body with a geom")
 
 
+def test_a_file_in_the_place_of_the_folder_is_told_before_anything_is_drawn(
+    tmp_path, capsys, monkeypatch
+):
+    made.block(tmp_path / "assets" / "one")
+    (tmp_path / "out").write_text("kept")
+    started = []
+    monkeypatch.setattr("joblib.Parallel", lambda **_: started.append)
+    command = ["assets", "sheet", str(tmp_path / "assets"), "--out", str(tmp_path / "out")]
+    assert main([*command, "--jobs", "1"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("out: cannot write there (File exists); choose another --out")
+    assert not started and (tmp_path / "out").read_text() == "kept"
+
+
 def test_command_without_a_folder_says_what_it_is_about_to_draw(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("manipose_mj.cli.assets.sheet._built_in", lambda _: {"mug": [("mug", 0)]})
     command = ["assets", "sheet", "--out", str(tmp_path), "--size", "48", "--jobs", "1"]
