@@ -1,6 +1,7 @@
 """Print how long a reset takes that changes to other objects: python benchmarks/experiments/scene_swaps.py [--count 12]
 
-CPU time of one process, which other processes of the machine do not change. All objects are built before. `first`
+CPU time of one process, which other processes of the machine do not change. All objects are built before. A reset of the
+tasks with several objects is to the next seed, which draws others; where there is furniture, to the next piece too. `first`
 is the first scene with an object or a piece in this process, which also finds where furniture can stand; `again` is the
 same in a second environment, which knows no scene yet.
 """
@@ -13,6 +14,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.categories import CATALOGUE
@@ -23,10 +26,15 @@ from manipose_mj.tasks.core.registry import named_task
 from manipose_mj.tasks.core.scene_source import SceneSource
 
 RIGID = ("single_object/target_pose", "single_object/position")
+CLUTTER = ("clutter/pick", "clutter/stacked")
 FURNITURE = (
     "articulated/open_cabinet_door",
     "articulated/open_microwave",
     "articulated/open_oven",
+    "articulated/store_cabinet_door",
+    "articulated/store_microwave",
+    "articulated/take_out_cabinet_door",
+    "articulated/take_out_microwave",
 )
 SPLIT = "test"
 
@@ -41,8 +49,10 @@ def main() -> None:
     print("| --- | ---: | ---: | ---: |")
     for task in RIGID:
         print(row(task, [EpisodeSpec(0, object=name) for name in firsts_of_categories(count)]))
+    for task in CLUTTER:
+        print(row(task, built(task, [EpisodeSpec(seed) for seed in range(count)])))
     for task in FURNITURE:
-        print(row(task, pieces(task)))
+        print(row(task, built(task, pieces(task))))
 
 
 def row(task: str, specs: Sequence[EpisodeSpec]) -> str:
@@ -79,9 +89,20 @@ def firsts_of_categories(count: int) -> list[str]:
 
 
 def pieces(task: str) -> list[EpisodeSpec]:
-    """Every piece of furniture that a task takes, built, with the first of the parts that it may be about."""
-    scenes = SceneSource(named_task(task), EnvConfig(task, obs_mode="state", split=SPLIT))
-    return [replace(group[0], seed=0) for group in scenes.strata()]
+    """Every piece of furniture that a task takes, with the first of the parts that it may be about; each with a seed."""
+    return [replace(group[0], seed=i) for i, group in enumerate(_scenes(task).strata())]
+
+
+def built(task: str, specs: Sequence[EpisodeSpec]) -> Sequence[EpisodeSpec]:
+    """The same episodes, with all the objects that they draw built."""
+    scenes = _scenes(task)
+    for spec in specs:
+        scenes.draw(np.random.RandomState(spec.seed), spec)
+    return specs
+
+
+def _scenes(task: str) -> SceneSource:
+    return SceneSource(named_task(task), EnvConfig(task, obs_mode="state", split=SPLIT))
 
 
 if __name__ == "__main__":
