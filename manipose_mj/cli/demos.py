@@ -47,10 +47,10 @@ def record_demos(
         folders, or folders of asset folders.
     """
     prepare_workers(jobs)
-    from manipose_mj.assets.categories import category_row, find
     from manipose_mj.cli.builtin_objects import load_objects
     from manipose_mj.cli.evaluate import check_names
     from manipose_mj.console import output
+    from manipose_mj.demos.layout import refuse_test_objects
     from manipose_mj.demos.record import RecordConfig, record
     from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
     from manipose_mj.tasks.core.registry import tasks_named
@@ -59,10 +59,7 @@ def record_demos(
         raise InputError("no task given; `manipose list` names them")
     tasks = tasks_named(tasks)
     named = check_names(tasks, objects)
-    for name in named:
-        category, index = find(name)
-        if category_row(category).split(index) == "test":
-            raise InputError(f"{name} is a test object; demonstrations take training objects")
+    refuse_test_objects(objects)  # before any is built
     configs = [
         RecordConfig(task, out, episodes, seed, failures, jobs, objects or None) for task in tasks
     ]

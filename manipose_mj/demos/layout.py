@@ -20,10 +20,15 @@ import h5py
 import numpy as np
 from jaxtyping import Float
 
+from manipose_mj.assets.categories import category_row, find
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 from manipose_mj.evaluation.protocol import VERSIONS
-from manipose_mj.evaluation.protocol.own_assets import digest_of_objects
+from manipose_mj.evaluation.protocol.own_assets import (
+    built_assets,
+    digest_of_objects,
+    version_with,
+)
 from manipose_mj.evaluation.records import write_atomically
 from manipose_mj.evaluation.statistics import versions
 from manipose_mj.gym.registration import env_id
@@ -165,6 +170,35 @@ def frozen_seeds(task: str) -> set[int]:
     """Evaluation seeds of a task, of all protocols that have it."""
     tables = [protocol.load(version).tasks for version in VERSIONS]
     return {seed for each in tables if task in each for seed in each[task].seeds.values()}
+
+
+def refuse_test_objects(objects: Iterable[str]) -> None:
+    """Raise `InputError` where an object is for tests: a built-in one, or one of a protocol's list of scans.
+
+    Args:
+      objects: Names of built-in objects, asset folders, or folders of them.
+    """
+    from manipose_mj.tasks.core.object_selection import is_folder  # loads the simulator
+
+    for each in objects:
+        if not is_folder(each):
+            _refuse_builtin(each, each)
+            continue
+        for asset in built_assets([each]):
+            if asset.built_in:
+                _refuse_builtin(asset.built_in, f"{asset.folder}: {asset.built_in}")
+            version = version_with(asset)
+            if version is not None:
+                raise InputError(
+                    f"{asset.folder}: {asset.name} of {asset.data_set} is a test object of protocol {version}; "
+                    "demonstrations take others"
+                )
+
+
+def _refuse_builtin(name: str, said: str) -> None:
+    category, index = find(name)
+    if category_row(category).split(index) == "test":
+        raise InputError(f"{said} is a test object; demonstrations take training objects")
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from manipose_mj.demos.layout import (
     frozen_seeds,
     read_set,
     recorded_name,
+    refuse_test_objects,
     task_folder,
     write_description,
     writing,
@@ -131,6 +132,7 @@ def record(
     config: RecordConfig,
     *,
     resume: bool = False,
+    for_training: bool = True,
     on_progress: Callable[[int, int], None] = _ignore,
 ) -> DemoSet:
     """Record until so many attempts have succeeded.
@@ -140,11 +142,15 @@ def record(
     Args:
       config: What to record.
       resume: Go on with what the folder holds: attempts, or demonstrations, to which those that lack are added.
+      for_training: Whether policies may learn from them: test objects are refused then.
       on_progress: Called with the number of successes so far and that wanted.
 
     Raises:
-      InputError: The folder holds demonstrations and `resume` is False, or others; or the baseline fails too often.
+      InputError: The folder holds demonstrations and `resume` is False, or others; an object is for tests; or the
+        baseline fails too often.
     """
+    if for_training:
+        refuse_test_objects(config.objects or ())
     new = [folder for folder in (config.parts, config.folder, config.out) if not folder.exists()]
     try:
         return _record(config, resume, on_progress)

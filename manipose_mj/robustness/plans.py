@@ -65,7 +65,7 @@ def recorded_plans(
         return _read(task, Path(source), count)
     with tempfile.TemporaryDirectory(prefix="manipose-plans-") as folder:
         config = RecordConfig(task, Path(folder), count, seed, jobs=jobs, objects=objects)
-        record(config, on_progress=on_progress)
+        record(config, for_training=False, on_progress=on_progress)
         return _read(task, Path(folder), count)
 
 

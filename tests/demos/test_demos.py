@@ -20,7 +20,13 @@ import pytest
 
 from manipose_mj.cli.main import main
 from manipose_mj.demos import record as recording
-from manipose_mj.demos.layout import frozen_seeds, read_actions, read_set, refuse_frozen
+from manipose_mj.demos.layout import (
+    frozen_seeds,
+    read_actions,
+    read_set,
+    refuse_frozen,
+    refuse_test_objects,
+)
 from manipose_mj.demos.lerobot_export import ExportConfig, export
 from manipose_mj.demos.playback import RecordedPolicy, slowed
 from manipose_mj.demos.record import record
@@ -29,6 +35,7 @@ from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.policy_settings import PolicySettings
 from manipose_mj.evaluation.runner import evaluate
 from manipose_mj.policies.protocol import ActionSpace
+from manipose_mj.robustness.plans import recorded_plans
 from tests.demos.recordings import (
     OBJECTS,
     TASK,
@@ -209,6 +216,42 @@ def test_frozen_seeds_are_refused(tmp_path, monkeypatch):
     first = next(config(tmp_path).seeds())
     monkeypatch.setattr(recording, "frozen_seeds", lambda task: {first[1]})
     assert next(config(tmp_path).seeds())[0] == 1
+
+
+def test_test_objects_are_refused_by_folder_too(tmp_path, capsys):
+    def folder(name, item, source):
+        path = tmp_path / "assets" / name / "asset.json"
+        path.parent.mkdir(parents=True)
+        stated = {"name": item, "provenance": {"source": source, "item": item}}
+        path.write_text(json.dumps({"schema_version": 1, **stated}))
+        return str(path.parent)
+
+    scan = folder("a", "46236", "PartNet-Mobility")
+    built_in = folder("b", "mug_004", "procedural catalogue")
+    others = [
+        folder("c", "46236", "my scans"),
+        folder("d", "mug_004", "my scans"),
+        folder("e", "mug_003", "procedural catalogue"),
+        folder("f", "mug_904", "procedural catalogue"),  # beyond those that are built in
+        "mug_003",
+    ]
+    refuse_test_objects(others)
+    told = f"{scan}: 46236 of partnet_mobility is a test object of protocol v1-real"
+    for named in (scan, str(tmp_path / "assets")):
+        assert (
+            main(["demos", "record", TASK, "--out", str(tmp_path / "o"), "--objects", named]) == 2
+        )
+        (line,) = capsys.readouterr().err.splitlines()
+        assert told in line
+    with pytest.raises(InputError, match=f"{built_in}: mug_004 is a test object"):
+        record(config(tmp_path / "o", objects=(*others, built_in)))
+    assert not (tmp_path / "o").exists()
+
+
+def test_plans_that_nobody_learns_from_may_be_of_test_objects(monkeypatch):
+    monkeypatch.setattr(recording, "_attempt", attempting)
+    plans = recorded_plans(TASK, "seeds", 1, objects=("mug_004",))
+    assert plans.config.objects == ("mug_004",) and len(plans.plans) == 1
 
 
 READERS = {

@@ -10,9 +10,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from manipose_mj.assets.asset import ASSET_FILE
+from manipose_mj.assets.categories import is_known
 from manipose_mj.assets.json_fields import read_json
 from manipose_mj.errors import InputError
-from manipose_mj.evaluation.protocol.frozen import Protocol, load
+from manipose_mj.evaluation.protocol.frozen import VERSIONS, Protocol, load
 
 # How the provenance of an asset begins that `manipose assets build SOURCE` made of a data set.
 PROVENANCE = {
@@ -20,18 +21,22 @@ PROVENANCE = {
     "google_scanned_objects": "Google Scanned Objects",
     "partnet_mobility": "PartNet-Mobility",
 }
+_CATALOGUE = (
+    "procedural catalogue"  # the provenance of objects that the catalogue's generators made
+)
 _DEPTH = 2  # of folders in a folder that are looked into
 
 
 @dataclass(frozen=True)
 class BuiltAsset:
     """An asset folder as its file states it. Attributes: folder; name; data_set: one of `PROVENANCE`, or empty;
-    made: of what and by what."""
+    made: of what and by what; built_in: which of the built-in objects it is, or empty."""
 
     folder: Path
     name: str
     data_set: str
     made: str
+    built_in: str = ""
 
 
 def built_assets(folders: Sequence[str | Path]) -> list[BuiltAsset]:
@@ -56,7 +61,18 @@ def _stated(path: Path) -> BuiltAsset:
     source = str(provenance.get("source", ""))
     data_set = next((name for name, start in PROVENANCE.items() if source.startswith(start)), "")
     made = json.dumps([provenance.get("inputs"), provenance.get("generator")], sort_keys=True)
-    return BuiltAsset(path.parent, str(document.get("name")), data_set, made)
+    item = str(provenance.get("item"))
+    built_in = item if source == _CATALOGUE and is_known(item) else ""
+    return BuiltAsset(path.parent, str(document.get("name")), data_set, made, built_in)
+
+
+def version_with(asset: BuiltAsset) -> str | None:
+    """The first protocol whose users build this object for it; None where none has it."""
+    for version in VERSIONS:
+        sources = load(version).sources
+        if asset.data_set and sources.get(asset.name) == asset.data_set:
+            return version
+    return None
 
 
 def needed(protocol: Protocol, tasks: Iterable[str]) -> tuple[str, ...]:
