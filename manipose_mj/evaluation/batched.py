@@ -130,16 +130,15 @@ def _played(
     state, ends = worlds.at(seeds), _no_ends(worlds.count)
     taken = 0
     while not ends.ended.all():
-        state, (looks, clipped, invalid, before) = several(state)
-        rows = zip(_unstacked(looks), *map(np.asarray, (clipped, invalid, before)), strict=True)
-        for i, (now, over, no_action, success_before) in enumerate(rows):
+        state, (looks, clipped, invalid) = several(state)
+        rows = zip(_unstacked(looks), *map(np.asarray, (clipped, invalid)), strict=True)
+        for i, (now, over, no_action) in enumerate(rows):
             playing = ~ends.ended
             ends.clipped += playing & over
             held = (now["held_at"] > 0) & (settings.stop == "success")
             ending = playing & (now["terminated"] | now["truncated"] | held)
             ends.once |= playing & now["success_once"]
-            # An action that is none is not carried out: what was so before it stays.
-            success = np.where(no_action, success_before, now["success"])
+            success = now["success"] & ~no_action
             ends.success = np.where(ending, success | held, ends.success)
             ends.diverged |= ending & now["terminated"] & ~held
             ends.overflowed |= playing & now["overflowed"]
@@ -172,7 +171,7 @@ def _several(
         beyond = jnp.abs(jnp.clip(action, worlds.lower, worlds.upper) - action).max(-1)
         after = worlds.step(state, action, hold)
         looks = {name: getattr(after, name) for name in _LOOKED_AT}
-        return after, (looks, beyond > ROUNDING, invalid, state.success)
+        return after, (looks, beyond > ROUNDING, invalid)
 
     return jax.jit(lambda state: jax.lax.scan(one, state, length=_LOOK_EVERY))
 

@@ -30,9 +30,10 @@ from manipose_mj.gym.droid import droid_observation, from_droid
 from manipose_mj.gym.features import Features
 from manipose_mj.policies.baseline import BaselinePolicy
 from manipose_mj.policies.loading import load_policy
-from manipose_mj.policies.protocol import ActionSpace, Policy, PolicyRaisedError
+from manipose_mj.policies.protocol import ActionSpace, Policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.environment import TaskEnvironment
+from manipose_mj.user_code import reason_of
 from manipose_mj.wire.client import RemoteFailureError
 
 _RECORD_EVERY = 5  # control steps
@@ -98,7 +99,6 @@ def run_policy_episode(
     Raises:
       InputError: Something named does not exist, or the policy's actions are those of another control mode.
       ServerLostError: The policy's server went away.
-      PolicyRaisedError: The policy's code failed.
     """
     policy = _Guarded(load_policy(settings.name, settings.arguments))
     settings = replace(settings, attachment=attachment_of(policy.policy))
@@ -146,12 +146,16 @@ def play(
     seed = spec.seed or 0
     first = environment.reset(replace(spec, seed=seed))
     task = environment.task
+    outcome = Outcome()
     attach: Callable[[composer.Environment], None] | None = getattr(policy, "attach", None)
-    if attach is not None:
-        attach(environment)
+    try:
+        if attach is not None:
+            attach(environment)
+    except StageFailure as failure:
+        outcome.failure = failure
     inner = policy.policy if isinstance(policy, _Guarded) else policy
     estimates = None
-    if isinstance(inner, BaselinePolicy):
+    if isinstance(inner, BaselinePolicy) and outcome.failure is None:
         estimates = EstimateErrors(task, environment.physics, inner.baseline)
     recorder = _Recorder(environment, inner)
     recorder.record()
@@ -168,17 +172,17 @@ def play(
     if droid:
         low, high = np.append(low[:-1], 0.0), np.append(high[:-1], 1.0)
     space = ActionSpace(low, high, task.control_mode.name, rules.hz)
-    outcome = Outcome()
     try:
-        policy.reset(
-            task=naming.task,
-            instruction="" if features is None else features.instruction,
-            seed=seed if policy_seed is None else policy_seed,
-            action_space=space,
-        )
+        if outcome.failure is None:
+            policy.reset(
+                task=naming.task,
+                instruction="" if features is None else features.instruction,
+                seed=seed if policy_seed is None else policy_seed,
+                action_space=space,
+            )
     except StageFailure as failure:
         outcome.failure = failure
-    else:
+    if outcome.failure is None:
         rollout = Rollout(
             environment,
             policy,
@@ -196,13 +200,15 @@ def play(
 
 
 def _raised(failure: StageFailure | None) -> str:
-    """The traceback of what an estimator or a server raised, where that ended the episode."""
+    """The traceback of what a policy, an estimator or a server raised, where that ended the episode."""
     failed = None if failure is None else failure.__cause__
     if isinstance(failed, RemoteFailureError):
         return failed.text
-    if not isinstance(failed, EstimatorFailedError) or failed.__cause__ is None:
+    if isinstance(failed, EstimatorFailedError):
+        failed = failed.__cause__
+    elif failure is not None and failure.stage != "policy":
         return ""
-    return "".join(traceback.format_exception(failed.__cause__))
+    return "" if failed is None else "".join(traceback.format_exception(failed))
 
 
 def _observer(features: Features | None, droid: bool) -> Callable[[Any], dict[str, Any]]:
@@ -224,7 +230,9 @@ def _result(
 ) -> EpisodeResult:
     task, physics, failure = environment.task, environment.physics, outcome.failure
     diverged = failure is not None and failure.stage == "physics"
-    success = task.succeeded(physics) and not diverged
+    # Who gives up with the goal met has met it; whose policy broke has not come to an end.
+    broken = failure is not None and failure.stage in ("physics", "policy")
+    success = not broken and task.succeeded(physics)
     if failure is None and not success:
         ended = "the policy said it was done" if estimates is None else "the plan was carried out"
         failure = StageFailure("release", f"the goal is not met though {ended}")
@@ -284,8 +292,8 @@ class _Guarded:
         except (InputError, ServerLostError, StageFailure, MemoryError):
             raise
         except (Exception, SystemExit) as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise PolicyRaisedError(f"the policy's {method} raised {reason}") from error
+            reason = f"the policy's {method} raised {reason_of(error)}"
+            raise StageFailure("policy", reason) from error
 
 
 def start_state(config: EnvConfig, spec: EpisodeSpec) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -49,7 +49,7 @@ class EstimateErrors:
             return failure
         tolerance = self._task.config.tolerance
         near = self.translation <= tolerance.translation and self.rotation <= tolerance.rotation
-        if near or failure.stage in ("perception", "physics"):
+        if near or failure.stage in ("perception", "physics", "policy"):
             return failure
         return StageFailure("perception", f"{self._worst}; then {failure}")
 

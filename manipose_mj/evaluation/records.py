@@ -97,7 +97,8 @@ class Trajectory:
       times: `(t,)` [s], about every 0.1 s.
       qpos: `(t, nq)`, the model's generalized positions.
       annotations: `t` strings, the primitive under way at each instant.
-      raised: Traceback of what somebody's estimator raised in the end; not part of what is drawn. Empty: nothing.
+      raised: Traceback of what somebody's policy or estimator raised in the end; not part of what is drawn.
+        Empty: nothing.
     """
 
     times: Float[np.ndarray, "t"]

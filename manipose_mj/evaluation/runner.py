@@ -46,7 +46,6 @@ from manipose_mj.evaluation.results_folder import (
 )
 from manipose_mj.evaluation.statistics import machine, summarize, versions
 from manipose_mj.policies.loading import load_policy, metadata_of
-from manipose_mj.policies.protocol import PolicyRaisedError
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
@@ -325,9 +324,8 @@ def _write_traceback(trajectory: Path, text: str) -> None:
 def _crashed(
     config: EvaluationConfig, task: str, episode: int, error: Exception, wall_s: float
 ) -> EpisodeResult:
-    of_policy = isinstance(error, PolicyRaisedError)
-    stage = "policy" if of_policy else "physics" if isinstance(error, PhysicsError) else "error"
-    reason = " ".join((str(error) if of_policy else f"{type(error).__name__}: {error}").split())
+    stage = "physics" if isinstance(error, PhysicsError) else "error"
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
     return EpisodeResult(
         task=task,
         episode=episode,

@@ -67,10 +67,6 @@ class Policy(Protocol):
         ...
 
 
-class PolicyRaisedError(Exception):
-    """A policy raised something that is no failure of an episode: the mistake is in its code."""
-
-
 @dataclass(frozen=True)
 class Decision:
     """A checked answer.

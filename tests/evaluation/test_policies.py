@@ -38,7 +38,7 @@ from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.wire.framing import pack
 from tests.few_objects import config, few
 from tests.places import ROOT
-from tests.policies.own_policies import Peeking, Reaching, answering_narrow
+from tests.policies.own_policies import Breaking, Peeking, Reaching, answering_narrow
 from tests.policies.test_remote import served
 
 TASK = "single_object/target_pose"
@@ -181,6 +181,38 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     others = [replace(results[0], episode=i, failure="plan", reason="no way") for i in (1, 2)]
     lines = common_reasons([*others, *results], tmp_path)
     assert lines == [line.replace("1 of 1", "1 of 3"), "failed in plan, 2 of 3: no way"]
+
+
+def test_a_policy_that_breaks_with_the_goal_met_has_failed(tmp_path, monkeypatch):
+    monkeypatch.setattr("manipose_mj.tasks.core.task.success", lambda *goals: True)
+    lines = []
+    for how in ("nan", "shape", "raise", "served"):
+        out, settings = tmp_path / how, PolicySettings(f"{HERE}:Breaking", json.dumps({"how": how}))
+        with served(Breaking()) as server:
+            if how == "served":
+                settings = PolicySettings(server.address)
+            evaluate(evaluation(out, settings, episodes=1))
+        lines += timeless(out)
+        notes = [note.read_text() for note in out.rglob("*.error.txt")]
+        raised = how in ("raise", "served")
+        assert len(notes) == raised and all("own_policies.py" in note for note in notes)
+        assert ("KeyError: 'weights'" in lines[-1].pop("reason")) == raised
+    decisions = [line.pop("decisions") for line in lines]
+    assert decisions == [2, 2, 1, 1]  # an answer that is none is one all the same
+    assert all(line == lines[0] for line in lines)
+    told = lines[0]
+    assert (told["failure"], told["success_at_end"], told["success_once"]) == (
+        "policy",
+        False,
+        True,
+    )
+    assert told["steps"] == 5 and told["object"]
+
+
+def test_a_policy_that_cannot_be_attached_fails_its_episodes():
+    result = run(PolicySettings(f"{HERE}:Unattached"))
+    assert (result.failure, result.decisions, result.steps) == ("policy", 0, 0)
+    assert result.reason == "the policy's attach raised KeyError: 'panda'" and result.object
 
 
 @pytest.mark.full

@@ -20,7 +20,6 @@ from manipose_mj.evaluation import records, runner
 from manipose_mj.evaluation.config import EvaluationConfig, episode_seed
 from manipose_mj.evaluation.records import EpisodeResult, read_results, read_trajectory
 from manipose_mj.evaluation.runner import evaluate
-from manipose_mj.policies.protocol import PolicyRaisedError
 
 SCRIPT = Path(fake.__file__)
 
@@ -255,7 +254,7 @@ def test_half_a_character_in_what_a_stranger_says_costs_one_episode(tmp_path: Pa
 
     def raising(env_config, spec, *, episode, **options):
         if episode == 0:
-            raise PolicyRaisedError("no file bad\udcff")
+            raise ValueError("no file bad\udcff")
         result, trajectory = sound(env_config, spec, episode=episode, **options)
         if episode == 1:
             failed = {"success_at_end": False, "failure": "perception", "reason": "bad\udcff"}
@@ -264,7 +263,7 @@ def test_half_a_character_in_what_a_stranger_says_costs_one_episode(tmp_path: Pa
 
     results = evaluate(config(tmp_path, episodes=3), runner=raising)
     said = {r.reason for r in results if r.episode < 2}
-    assert said == {"no file bad\\udcff", "bad\\udcff"}
+    assert said == {"ValueError: no file bad\\udcff", "bad\\udcff"}
     assert results == sorted(read_results(tmp_path / "results.jsonl")[0], key=lambda r: r.key)
     notes = sorted(tmp_path.rglob("*.error.txt"))
     assert len(notes) == 4 and all("bad\\udcff" in note.read_text("utf-8") for note in notes)

@@ -60,6 +60,13 @@ class Peeking(Raising):
     def attach(self, environment: Any) -> None: ...
 
 
+class Unattached(Raising):
+    """A policy that fails when it is given the simulator."""
+
+    def attach(self, environment: Any) -> None:
+        raise KeyError("panda")
+
+
 class GivingUp(Raising):
     """A policy that says so."""
 
@@ -90,6 +97,24 @@ class Dying(Reaching):
         if self.episodes == 3 and self.asked == 2:
             os._exit(9)
         return super().infer(obs)
+
+
+class Breaking:
+    """Stays where it is, once, and then breaks in one of several ways."""
+
+    def __init__(self, how: str = "raise") -> None:
+        self.how = how
+
+    def reset(self, **episode: Any) -> None:
+        self.asked = 0
+
+    def infer(self, obs: Any) -> Any:
+        self.asked += 1
+        if self.asked == 1:
+            return {"actions": np.append(obs["agent_pos"][:7], 0.08)[None]}
+        if self.how == "raise":
+            raise KeyError("weights")
+        return {"actions": np.full((1, 8), np.nan) if self.how == "nan" else np.zeros((1, 7))}
 
 
 class WithoutInfer:
