@@ -89,7 +89,7 @@ def evaluate(
         by default state, and state+rgb in DROID's format.
       control_mode: What its actions mean; by default pd_joint_pos.
       hz: Its actions per second of simulated time, by default 10, at most 50; targets are held in between.
-      execute: How many actions of each answer are carried out; by default all.
+      execute: How many actions of each answer are carried out; by default all, as of an answer that says done.
       obs_format: Names of its observations: manipose by default, or DROID's.
       stop: When an episode ends: once the goal has held for 0.5 s, as by default, or at the time limit.
       planner: Makes the baseline's plans: rules, a language model, or the recorded answers of one.

@@ -40,7 +40,7 @@ class PolicySettings:
       obs_mode: What it sees, modes and keys joined by `+`; by default `state`, and `state+rgb` in DROID's format.
       control_mode: What its actions mean.
       hz: Its actions per second of simulated time; targets are held in between.
-      execute: Of each answer's actions, how many are carried out; None: all.
+      execute: Of each answer's actions, how many are carried out; None: all. Of an answer that says `done`, all are.
       obs_format: Names of observations, and the sign of the gripper's command.
       stop: `"success"`: an episode ends once the goal has held for half a second; `"horizon"`: at its time limit.
       attachment: What a policy that is given the simulator takes from there; None where it is not given. An

@@ -97,7 +97,9 @@ class Rollout:
         try:
             while True:
                 decision = self._decide(step)
-                actions = self._translate(decision.actions)[: self._rules.execute]
+                # Nobody is asked after the last answer: all of it is carried out.
+                count = None if decision.done else self._rules.execute
+                actions = self._translate(decision.actions)[:count]
                 for number, action in enumerate(actions, start=1):
                     following = self._carry_out(action, observe=number == len(actions))
                     if following is None:

@@ -66,12 +66,13 @@ def test_recordings_have_maniskills_layout(demos):
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("hz", [50.0, 10.0])
-def test_recorded_targets_succeed_as_a_policy(demos, hz, tmp_path):
+@pytest.mark.parametrize(("hz", "execute"), [(50.0, None), (10.0, None), (10.0, 10)])
+def test_recorded_targets_succeed_as_a_policy(demos, hz, execute, tmp_path):
     settings = PolicySettings(
         "manipose_mj.demos.playback:RecordedPolicy",
         json.dumps({"data": str(demos.path)}),
         hz=hz,
+        execute=execute,
         stop="horizon",
     )
     first = next(config(tmp_path).seeds())[1]

@@ -75,9 +75,16 @@ def test_the_time_of_a_policy_that_gives_up_counts():
 
 @pytest.mark.parametrize(
     ("hz", "execute", "decisions", "steps"),
-    [(10.0, None, 5, 5 * 4 * 5), (50.0, None, 5, 5 * 4), (10.0, 1, 5, 5 * 5), (15.0, 3, 5, 50)],
+    [
+        (10.0, None, 5, 5 * 4 * 5),
+        (50.0, None, 5, 5 * 4),
+        (10.0, 1, 5, (4 * 1 + 4) * 5),
+        (15.0, 3, 5, round((4 * 3 + 4) * 50 / 15)),
+    ],
 )
-def test_actions_are_held_at_the_rate_and_answers_cut(hz, execute, decisions, steps):
+def test_actions_are_held_at_the_rate_and_all_answers_but_the_last_cut(
+    hz, execute, decisions, steps
+):
     result = run(replace(REACHING, hz=hz, execute=execute))
     assert (result.decisions, result.steps) == (decisions, steps)
     assert result.clipped_actions == 0 and 0 < result.policy_s < result.wall_s
