@@ -86,6 +86,7 @@ def run_policy_episode(
     episode: int = 0,
     pose: str = "",
     settings: PolicySettings,
+    begun: bool = False,
 ) -> tuple[EpisodeResult, Trajectory]:
     """Run anybody's policy for one episode; arguments as of `run_episode`, but poses are the policy's affair.
 
@@ -95,6 +96,7 @@ def run_policy_episode(
       episode: Index, copied into the result.
       pose: Ignored.
       settings: The policy, what it sees, and how it acts.
+      begun: Whether there are results of other episodes; actions of another width are a failure of this one then.
 
     Raises:
       InputError: Something named does not exist, or the policy's actions are those of another control mode.
@@ -102,7 +104,7 @@ def run_policy_episode(
     """
     policy = _Guarded(load_policy(settings.name, settings.arguments))
     settings = replace(settings, attachment=attachment_of(policy.policy))
-    rules = Rules(settings.hz, settings.execute, settings.stop)
+    rules = Rules(settings.hz, settings.execute, settings.stop, begun)
     naming = Naming(config.task, episode, settings.pose_source, settings.mask_source)
     return play(environment_of(config), policy, spec, rules, naming, settings)
 

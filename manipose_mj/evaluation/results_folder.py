@@ -126,6 +126,12 @@ def kept_results(
     return results
 
 
+def holds_results(out: Path) -> bool:
+    """Whether the folder holds a result, of this run or one before."""
+    path = out / RESULTS_FILE
+    return path.exists() and path.stat().st_size > 0
+
+
 def is_asked_for(out: Path, identity: dict[str, Any]) -> bool:
     """Whether what the folder's results were asked for is this, and no less."""
     before = _run_before(out)

@@ -25,11 +25,15 @@ Observe = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class Rules:
-    """How a policy's actions are carried out; attributes as in `PolicySettings`."""
+    """How a policy's actions are carried out; attributes as in `PolicySettings`, and one more.
+
+    Attributes: begun: whether the policy has played before; a first answer of another width is a failure then.
+    """
 
     hz: float = CONTROL_HZ
     execute: int | None = None
     stop: Stop = "horizon"
+    begun: bool = False
 
 
 @dataclass
@@ -122,7 +126,8 @@ class Rollout:
                 outcome.policy_s += time.perf_counter() - start
             outcome.decisions += 1
             width = answered_width(answer)
-            if outcome.decisions == 1 and width is not None and width != size:
+            first = outcome.decisions == 1 and not self._rules.begun
+            if first and width is not None and width != size:
                 mode = self._environment.task.control_mode.name
                 raise InputError(
                     f"the policy's actions have {width} numbers; {mode} takes {size}: choose "

@@ -40,6 +40,7 @@ from manipose_mj.evaluation.results_folder import (
     RUN_FILE,
     SUMMARY_FILE,
     append_result,
+    holds_results,
     is_asked_for,
     kept_results,
     results_file,
@@ -94,9 +95,13 @@ class BaselineRunner:
 
 @dataclass(frozen=True)
 class PolicyRunner:
-    """The runner of every real evaluation of somebody's policy."""
+    """The runner of every real evaluation of somebody's policy.
+
+    Attributes: settings: of the policy; out: folder of the results.
+    """
 
     settings: PolicySettings
+    out: Path
 
     def __call__(
         self, config: EnvConfig, spec: EpisodeSpec, *, episode: int, pose: str
@@ -105,7 +110,13 @@ class PolicyRunner:
         from manipose_mj.evaluation.episode import run_policy_episode  # as above
 
         with _quiet_simulator():
-            return run_policy_episode(config, spec, episode=episode, settings=self.settings)
+            return run_policy_episode(
+                config,
+                spec,
+                episode=episode,
+                settings=self.settings,
+                begun=holds_results(self.out),
+            )
 
 
 @contextmanager
@@ -157,7 +168,7 @@ def evaluate(
     if runner is None:
         _check_protocol(config)
     if runner is None and config.policy is not None:
-        runner = PolicyRunner(config.policy)
+        runner = PolicyRunner(config.policy, config.out.absolute())
     elif runner is None:
         if config.dask is None:  # workers elsewhere may have keys of their own
             config.planner.language_model()

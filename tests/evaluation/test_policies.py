@@ -320,7 +320,7 @@ def test_a_lost_server_is_exit_code_1_also_where_a_worker_never_met_it(jobs, tmp
 def test_a_worker_that_finds_no_server_has_lost_it(tmp_path):
     gone = replace(REACHING, name="ws://localhost:9")
     with pytest.raises(ServerLostError, match="no policy server answers .*repeat with --resume"):
-        run_one(evaluation(tmp_path, gone), PolicyRunner(gone), TASK, 0)
+        run_one(evaluation(tmp_path, gone), PolicyRunner(gone, tmp_path), TASK, 0)
 
 
 def test_resume_refuses_the_results_of_another_policy(tmp_path):
@@ -417,6 +417,18 @@ def test_actions_of_another_control_mode_end_the_evaluation(jobs, remote, tmp_pa
         assert main([*words, "--out", str(tmp_path / "out"), "--policy", name]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "have 7 numbers; pd_joint_pos takes 8" in said
+
+
+def test_actions_of_another_width_in_a_later_episode_are_a_failure(tmp_path):
+    settings = PolicySettings(f"{HERE}:Narrowing")
+    load_policy.cache_clear()
+    results = evaluate(evaluation(tmp_path, settings, episodes=2))
+    assert [each.failure for each in results] == ["release", "policy"]
+    assert "have shape (1, 7); expected (t, 8)" in results[1].reason
+    load_policy.cache_clear()  # as in a process of its own, whose first answer is narrow
+    load_policy(settings.name, None).after = 0
+    resumed = evaluate(evaluation(tmp_path, settings, episodes=3), resume=True)
+    assert [each.failure for each in resumed] == ["release", "policy", "policy"]
 
 
 def test_a_step_that_nobody_observes_changes_only_the_observation():

@@ -99,6 +99,19 @@ class Dying(Reaching):
         return super().infer(obs)
 
 
+class Narrowing:
+    """Answers without a gripper after some episodes."""
+
+    def __init__(self, after: int = 1) -> None:
+        self.after = after
+
+    def reset(self, **episode: Any) -> None:
+        self.after -= 1
+
+    def infer(self, obs: Any) -> Any:
+        return {"actions": np.zeros((1, 8 if self.after >= 0 else 7)), "done": True}
+
+
 class Breaking:
     """Stays where it is, once, and then breaks in one of several ways."""
 
