@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import logging
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -12,11 +13,15 @@ from typing import IO, Any
 
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.records import EpisodeResult, read_results, to_line
+from manipose_mj.policies.loading import telling
 
 RESULTS_FILE = "results.jsonl"
 SUMMARY_FILE = "summary.json"
 RUN_FILE = "run.json"
+METADATA = ("policy metadata", "estimator metadata")
 _DISK_FAILURES = {errno.ENOSPC, errno.EIO, errno.EROFS, errno.EDQUOT, errno.EFBIG}
+
+logger = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -108,9 +113,13 @@ def kept_results(
     if results:
         before = _run_before(out)
         for name, value in identity.items():
-            if not _goes_on(name, before.get(name), value):
+            old = before.get(name)
+            if name in METADATA:
+                _tell_changed(out, name, old, value)
+                old, value = telling(old), telling(value)
+            if not _goes_on(name, old, value):
                 raise InputError(
-                    f"{out}: its results have {name} {before.get(name)!r}, this run has "
+                    f"{out}: its results have {name} {old!r}, this run has "
                     f"{value!r}; resume with the same configuration, of which tasks and episodes "
                     "may be more, or choose another --out"
                 )
@@ -124,6 +133,14 @@ def kept_results(
             )
     file.truncate(size)
     return results
+
+
+def _tell_changed(out: Path, name: str, before: Any, now: dict[str, Any]) -> None:
+    """Say what of a method's metadata is another than before, which is no reason to stop."""
+    before = before if isinstance(before, dict) else {}
+    keys = sorted({*before, *now} - {*telling(before), *telling(now)})
+    if changed := [key for key in keys if before.get(key) != now.get(key)]:
+        logger.warning("%s: other %s than before: %s", out, name, ", ".join(changed))
 
 
 def holds_results(out: Path) -> bool:

@@ -13,6 +13,9 @@ from manipose_mj.user_code import factory_arguments, made_by_user
 from manipose_mj.wire.address import shown
 from manipose_mj.wire.client import is_address
 
+# What of a method's metadata tells it from others; all else, such as when its server started, may change.
+TELLING = ("name", "model", "version", "checkpoint", "commit")
+
 
 @lru_cache(maxsize=1)
 def load_policy(name: str, arguments: str | None = None) -> Policy:
@@ -42,6 +45,12 @@ def metadata_of(method: object) -> dict[str, Any]:
     """What a policy or estimator says of itself, as far as JSON can hold it; empty for those that say nothing."""
     said = getattr(method, "metadata", {})
     return plain(said) if isinstance(said, dict) else {}
+
+
+def telling(metadata: Any) -> dict[str, Any]:
+    """What of a method's metadata results belong to."""
+    said = metadata if isinstance(metadata, dict) else {}
+    return {name: said[name] for name in TELLING if name in said}
 
 
 def plain(value: Any) -> Any:
