@@ -78,10 +78,11 @@ class PolicySettings:
         ):
             if value not in known:
                 raise unknown_name(what, value, known)
-        parts = self.obs_mode.split("+")
-        if self.obs_format == "droid" and not {"state", "rgb"} <= set(parts):
+        parts = set(self.obs_mode.split("+"))
+        if self.obs_format == "droid" and parts != {"state", "rgb"}:
+            what = "has more than" if {"state", "rgb"} < parts else "lacks"
             raise InputError(
-                f"observation mode {self.obs_mode!r} lacks what DROID's format is made of; "
+                f"observation mode {self.obs_mode!r} {what} what DROID's format is made of; "
                 "add --obs-mode state+rgb"
             )
 

@@ -295,7 +295,11 @@ POLICY = f"evaluate {TASK} --jobs 1 --out {{tmp}}/out --policy {HERE}:Reaching"
         (f"{POLICY} --hz 60", "hz is 60; expected more than 0 and at most 50"),
         (f"{POLICY} --execute 0", "execute is 0; expected at least 1"),
         (f"{POLICY} --pose estimated", "leave it out with a policy"),
-        (f"{POLICY} --obs-format droid --obs-mode state", "add --obs-mode state+rgb"),
+        (f"{POLICY} --obs-format droid --obs-mode state", "lacks what DROID's format is made of"),
+        (
+            f"{POLICY} --obs-format droid --obs-mode state+rgb+pose+depth",
+            "'state+rgb+pose+depth' has more than what DROID's format is made of; add --obs-mode st",
+        ),
         (f"{POLICY} --policy-args [1]", "expected a JSON object"),
         (f'{POLICY} --policy-args {{{{"a":NaN}}}}', "NaN is no finite number"),
         (f"{POLICY} --resample 3", "there is no protocol whose seeds it replaces"),
