@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -99,11 +100,26 @@ def test_a_protocols_episodes_are_shared_out_and_only_new_rollouts_count(environ
         ({"hz": 15}, "divisor of 50"),
         ({"protocol": "v2"}, "protocol"),
         ({"obs_mode": "poses"}, "did you mean pose"),
+        ({"protocol": "v1"}, "objects are .*; protocol v1 has its own"),
+        (
+            {"protocol": "v1-real", "objects": None},
+            "evaluate --protocol v1-real --assets DIR` plays",
+        ),
+        ({"protocol": "v1", "objects": None, "task": "a/b"}, "task"),
     ],
 )
 def test_bad_input_is_one_line(environment_class, options, said):
-    with pytest.raises(InputError, match=said):
-        environment_class(TASK, objects=few(TASK), **options)
+    with pytest.raises(InputError, match=said) as caught:
+        environment_class(**{"task": TASK, "objects": few(TASK), **options})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_task_that_is_not_as_the_protocol_fixes_it_is_refused(environment_class, monkeypatch):
+    longer = replace(protocol.load("v1").task(TASK), horizon=99.0)
+    changed = replace(protocol.load("v1"), tasks={TASK: longer})
+    monkeypatch.setattr(protocol, "load", lambda version: changed)
+    with pytest.raises(InputError, match="protocol v1 fixes horizon 99.0, here it is 40"):
+        environment_class(TASK, protocol="v1")
 
 
 @pytest.mark.full

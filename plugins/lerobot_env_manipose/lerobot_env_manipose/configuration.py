@@ -27,7 +27,7 @@ class ManiPoseEnvConfig(EnvConfig):
       control_mode: What actions mean.
       protocol: Version whose frozen episodes are played, from the first on, such as `v1`; empty: those of LeRobot's
         seeds, on training objects.
-      objects: What to draw from instead of the built-in objects.
+      objects: What to draw from instead of the built-in objects; not with a protocol.
       render_mode: `"rgb_array"`.
     """
 

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from manipose_mj import suite
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol as protocols
+from manipose_mj.evaluation.protocol.present_settings import check_settings
 from manipose_mj.gym.features import CAMERAS, IMAGE_SIZE, Features, feature_sensors
 from manipose_mj.gym.spaces import FAR, action_box
 from manipose_mj.mjcf.cameras.pictures import make_painter
@@ -61,14 +62,24 @@ class LeRobotEnv(gymnasium.Env[dict[str, Any], np.ndarray]):
           protocol: Version whose frozen episodes are played, one after the other, whatever the seeds; empty: none.
           first: Of them that this environment plays.
           stride: To its next; the number of environments at once.
-          objects: What to draw from instead of the built-in objects.
+          objects: What to draw from instead of the built-in objects; not with a protocol, which has its own.
           render_mode: `"rgb_array"`.
 
         Raises:
-          InputError: A name is unknown, or the rate cannot be.
+          InputError: A name is unknown, the rate cannot be, or the task is not as the protocol fixes it.
         """
         if hz < 1 or CONTROL_HZ % hz:
             raise InputError(f"hz is {hz}; expected a divisor of {CONTROL_HZ}")
+        self._frozen = protocols.load(protocol) if protocol else None
+        if self._frozen is not None and objects:
+            raise InputError(
+                f"objects are {', '.join(objects)}; protocol {protocol} has its own: leave out one of both"
+            )
+        if self._frozen is not None and self._frozen.sources:
+            raise InputError(
+                f"protocol {protocol} takes assets that users build; "
+                f"`manipose evaluate --protocol {protocol} --assets DIR` plays it"
+            )
         split = "test" if protocol else "train"
         config = EnvConfig(
             task,
@@ -78,6 +89,8 @@ class LeRobotEnv(gymnasium.Env[dict[str, Any], np.ndarray]):
             split=split,
             sensors=feature_sensors(obs_mode),
         )
+        if self._frozen is not None:
+            check_settings(self._frozen, config)
         self.task, self.task_description = task, ""
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": hz}
@@ -86,7 +99,6 @@ class LeRobotEnv(gymnasium.Env[dict[str, Any], np.ndarray]):
         self._painter: tuple[Any, Any] = (None, None)  # the model, and what draws it
         self._hold = CONTROL_HZ // hz
         self._held_steps = round(SUCCESS_HELD * CONTROL_HZ)
-        self._frozen = protocols.load(protocol) if protocol else None
         self._number, self._stride = first, stride
         self._max_episode_steps = int(np.ceil(self._environment.task.config.horizon * hz))
         self.action_space = action_box(self._environment.action_spec())
