@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -29,12 +29,14 @@ from manipose_mj.errors import InputError, worker_deaths
 from manipose_mj.evaluation.config import episode_seed
 from manipose_mj.evaluation.protocol.own_assets import digest_of_objects
 from manipose_mj.evaluation.records import write_atomically
+from manipose_mj.evaluation.results_folder import lock
 
 if TYPE_CHECKING:
     from manipose_mj.tasks.core.config import EnvConfig
 
 PARTS = "attempts"
 _IDENTITY = "run.json"
+_LOCK = ".lock"  # there while a recording runs
 # Attempts for one success, before a task counts as too hard.
 _PATIENCE = 10
 
@@ -146,21 +148,47 @@ def record(
       on_progress: Called with the number of successes so far and that wanted.
 
     Raises:
-      InputError: The folder holds demonstrations and `resume` is False, or others; an object is for tests; or the
-        baseline fails too often.
+      InputError: The folder holds demonstrations and `resume` is False, or others; another recording is writing
+        there; an object is for tests; or the baseline fails too often.
     """
     if for_training:
         refuse_test_objects(config.objects or ())
     new = [folder for folder in (config.parts, config.folder, config.out) if not folder.exists()]
     try:
-        return _record(config, resume, on_progress)
+        with _alone(config):
+            try:
+                return _record(config, resume, on_progress)
+            except InputError:
+                if config.parts in new and not any(config.parts.glob("[0-9]*")):
+                    shutil.rmtree(config.parts, ignore_errors=True)
+                raise
     except InputError:
-        if config.parts in new and not any(config.parts.glob("[0-9]*")):
-            shutil.rmtree(config.parts, ignore_errors=True)
-            for folder in new[1:]:
-                with suppress(OSError):  # somebody else writes there
-                    folder.rmdir()
+        for folder in new:
+            with suppress(OSError):  # it holds something, or is gone
+                folder.rmdir()
         raise
+
+
+@contextmanager
+def _alone(config: RecordConfig) -> Iterator[None]:
+    """Inside, no other recording writes into the task's folder.
+
+    Raises:
+      InputError: Another one does, or the folder cannot be written.
+    """
+    path = config.folder / _LOCK
+    try:
+        config.folder.mkdir(parents=True, exist_ok=True)
+        file = path.open("ab")
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{config.folder}: cannot write there ({reason})") from None
+    with file:
+        lock(file, config.folder, "recording")
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
 
 
 def _record(config: RecordConfig, resume: bool, on_progress: Callable[[int, int], None]) -> DemoSet:

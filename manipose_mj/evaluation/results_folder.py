@@ -39,7 +39,7 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
         raise InputError(f"{out}: cannot write there ({reason}); choose another --out") from None
     try:
         with file:
-            _lock(file, out)
+            lock(file, out, "evaluation")
             try:
                 yield file
             except InputError:
@@ -72,8 +72,17 @@ def _remove_if_empty(file: IO[bytes], out: Path, new: bool) -> None:
             out.rmdir()
 
 
-def _lock(file: IO[bytes], out: Path) -> None:
-    """Keep a second evaluation out of the folder; the lock goes with the process, however it ends."""
+def lock(file: IO[bytes], out: Path, what: str) -> None:
+    """Keep a second writer out of a folder; the lock goes with the process, however it ends.
+
+    Args:
+      file: In the folder, which every writer opens.
+      out: The folder.
+      what: Writes there.
+
+    Raises:
+      InputError: Another one is writing.
+    """
     try:
         import fcntl
     except ImportError:  # Windows
@@ -81,7 +90,7 @@ def _lock(file: IO[bytes], out: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(f"{out}: another evaluation is writing there; wait for it") from None
+        raise InputError(f"{out}: another {what} is writing there; wait for it") from None
 
 
 def kept_results(

@@ -89,6 +89,26 @@ def test_a_set_is_extended_by_what_it_holds_alone(tmp_path, monkeypatch):
         record(config(tmp_path / "successes", **more), resume=True)
 
 
+def test_a_second_recording_in_the_same_folder_is_refused_while_one_runs(tmp_path, monkeypatch):
+    told = []
+
+    def disturbed(asked, number, seed):
+        for resume in (False, True):
+            with pytest.raises(InputError) as refusal:
+                record(config(tmp_path, seed=2), resume=resume)
+            told.append(str(refusal.value))
+        return attempting(asked, number, seed)
+
+    monkeypatch.setattr(recording, "_attempt", disturbed)
+    demos = record(config(tmp_path))
+    said = f"{demos.path.parent}: another recording is writing there; wait for it"
+    assert set(told) == {said} and len(demos.episodes) == 2
+    assert sorted(each.suffix for each in demos.path.parent.iterdir()) == [".h5", ".json"]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot write there"):
+        record(config(tmp_path / "file"))
+
+
 def test_a_set_of_other_builds_is_not_extended(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "_attempt", attempting)
     asset = tmp_path / "assets" / "mug" / "asset.json"
