@@ -63,7 +63,7 @@ class RemoteEstimator:
             return self._client.ask(observation)
         except RemoteFailureError as error:
             self.close()
-            raise EstimatorFailedError(f"{shown(self.address)}: {error}") from None
+            raise EstimatorFailedError(f"{shown(self.address)}: {error}") from error
 
 
 class EstimatorService:
@@ -96,7 +96,7 @@ class EstimatorService:
         except (ServerLostError, MemoryError):
             raise
         except EstimatorFailedError as error:
-            raise EstimatorFailedError(f"estimator {self.name}: {error}") from None
+            raise EstimatorFailedError(f"estimator {self.name}: {error}") from error
         except (Exception, SystemExit) as error:  # whatever a stranger's code raises
             raise EstimatorFailedError(
                 f"estimator {self.name} raised {reason_of(error)}"

@@ -198,19 +198,20 @@ def play(
     recorder.record()
     wall_s = time.perf_counter() - started
     result = _result(environment, outcome, naming, seed, estimates, wall_s)
-    return result, replace(recorder.trajectory(), raised=_raised(outcome.failure))
+    return result, replace(recorder.trajectory(), raised=traceback_of(outcome.failure))
 
 
-def _raised(failure: StageFailure | None) -> str:
+def traceback_of(failure: StageFailure | None) -> str:
     """The traceback of what a policy, an estimator or a server raised, where that ended the episode."""
     failed = None if failure is None else failure.__cause__
+    of_estimator = isinstance(failed, EstimatorFailedError)
+    while isinstance(failed, EstimatorFailedError):
+        failed = failed.__cause__
     if isinstance(failed, RemoteFailureError):
         return failed.text
-    if isinstance(failed, EstimatorFailedError):
-        failed = failed.__cause__
-    elif failure is not None and failure.stage != "policy":
+    if failure is None or failed is None or not (of_estimator or failure.stage == "policy"):
         return ""
-    return "" if failed is None else "".join(traceback.format_exception(failed))
+    return "".join(traceback.format_exception(failed))
 
 
 def _observer(features: Features | None, droid: bool) -> Callable[[Any], dict[str, Any]]:

@@ -11,11 +11,17 @@ import pytest
 import tests.evaluation.fake_episodes as fake
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError, ServerLostError
+from manipose_mj.estimators.answer import EstimatorFailedError
+from manipose_mj.estimators.loading import load_estimator
 from manipose_mj.estimators.settings import EstimatorSettings
 from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.episode import traceback_of
 from manipose_mj.evaluation.records import read_results
 from manipose_mj.evaluation.runner import BaselineRunner, evaluate, run_one
+from manipose_mj.failures import StageFailure
+from tests.estimators.answers import Raises
 from tests.few_objects import few
+from tests.wire.answering import answering
 
 TASK = "single_object/target_pose"
 MIDDLE = EstimatorSettings("tests.estimators.answers:Middle", '{"score": 0.5}', give_cad=True)
@@ -95,12 +101,30 @@ def test_episodes_are_asked_of_it(tmp_path, monkeypatch):
     assert asked == [("estimated", MIDDLE)] * 4
 
 
+def test_the_traceback_of_an_estimator_on_a_server_is_found():
+    with answering(Raises().estimate) as address:
+        service = load_estimator(EstimatorSettings(address))
+        with pytest.raises(EstimatorFailedError) as caught:
+            service.estimate({})
+    failure = StageFailure("perception", "no estimate")
+    failure.__cause__ = caught.value
+    assert "answers.py" in traceback_of(failure)
+    with answering(lambda question: {"score": 1.0}) as address:
+        service = load_estimator(EstimatorSettings(address))
+        with pytest.raises(EstimatorFailedError) as caught:
+            service.estimate({})
+    failure.__cause__ = caught.value
+    assert traceback_of(failure) == ""  # a wrong answer raised nothing
+
+
 @pytest.mark.full
-def test_an_estimator_that_raises_leaves_its_traceback(tmp_path):
-    raises = EstimatorSettings("tests.estimators.answers:Raises")
-    asked = replace(config(tmp_path, raises), objects=few(TASK), episodes=1)
-    (result,) = evaluate(asked)
-    assert result.failure == "perception" and "raised KeyError" in result.reason
+@pytest.mark.parametrize("remote", [False, True])
+def test_an_estimator_that_raises_leaves_its_traceback(remote, tmp_path):
+    with answering(Raises().estimate) as address:
+        raises = EstimatorSettings(address if remote else "tests.estimators.answers:Raises")
+        asked = replace(config(tmp_path, raises), objects=few(TASK), episodes=1)
+        (result,) = evaluate(asked)
+    assert result.failure == "perception" and "KeyError" in result.reason
     (note,) = tmp_path.rglob("*.error.txt")
     assert "answers.py" in note.read_text() and "KeyError" in note.read_text().splitlines()[-1]
     assert note.with_name(note.name.replace(".error.txt", ".npz")).is_file()
