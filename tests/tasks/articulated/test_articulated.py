@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,8 @@ from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from manipose_mj import suite
 from manipose_mj.assets import catalogue
+from manipose_mj.assets.asset import ASSET_FILE, MODEL_FILE
+from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import protocol
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
@@ -148,12 +151,15 @@ def test_a_sliding_door_is_no_drawer():
         possible_parts(replace(asset, parts=(aside,)), PartChoice(("drawer", "door")), hollow=False)
 
 
-def test_a_part_that_is_asked_for_without_a_piece_is_of_a_piece_that_has_it():
+def test_a_part_that_is_asked_for_without_a_piece_is_of_a_piece_that_has_it(tmp_path):
     one = _as("cabinet", "one")
-    renamed = tuple(
-        replace(part, name="door_1") if part.name == "door" else part for part in one.parts
-    )
-    other = replace(one, name="other", parts=renamed)
+    folder = shutil.copytree(one.folder, tmp_path / "other")
+    for file, name in ((ASSET_FILE, '"name": "door"'), (MODEL_FILE, 'name="door"')):
+        text = (folder / file).read_text(encoding="utf-8")
+        assert name in text
+        text = text.replace(name, name.replace("door", "door_1"))
+        (folder / file).write_text(text, encoding="utf-8")
+    other = replace(read_asset(folder), name="other")
     own = EnvConfig("articulated/open_cabinet_door", objects=(one, other))
     scenes = SceneSource(named_task(own.task), own)
     for seed in range(8):
