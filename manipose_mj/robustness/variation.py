@@ -97,6 +97,7 @@ class Varied:
         pads = np.asarray(physics.bind(task.robot.pad_geoms).element_id)
         self._task, self._physics = task, physics
         self._variation, self._pads = variation, pads
+        self._pressed: float | None = None  # depth of the plan's start, once it is needed [m]
         self._randomiser = Randomiser(
             variation.strength, physics, task.scene.rigid_objects, pads.tolist()
         )
@@ -128,9 +129,8 @@ class Varied:
         distance = rng.uniform(0, self._variation.shift_cm) / 100
         turn = rng.uniform(-1, 1) * radians(self._variation.turn_deg)
         grip = float(np.exp(rng.uniform(-1, 1) * np.log(self._variation.pad_friction)))
-        own = np.random.RandomState(
-            rng.randint(2**31)
-        )  # however often it draws, the next world is the same
+        # However often it draws, the next world is the same.
+        own = np.random.RandomState(rng.randint(2**31))
         if grip != 1.0:
             # A start states all fields of the model or none.
             changes = replace(changes, fields={**self._stated(), **changes.fields})
@@ -139,23 +139,25 @@ class Varied:
         shift = distance * np.array([np.cos(direction), np.sin(direction), 0.0])
         drawn |= {"shift_cm": 100 * distance, "turn_deg": float(np.rad2deg(turn))}
         moved = replace(_moved(start, shift, turn), model=changes)
-        moved, errors = self._with_own_errors(moved, self.depth(start), own)
+        moved, errors = self._with_own_errors(moved, start, own)
         return moved, drawn | errors
 
     def _with_own_errors(
-        self, start: EpisodeStart, depth: float, rng: np.random.RandomState
+        self, start: EpisodeStart, planned: EpisodeStart, rng: np.random.RandomState
     ) -> tuple[EpisodeStart, dict[str, float]]:
         """Each object beside where it was, and the first one's errors.
 
         Args:
           start: Moved as one.
-          depth: To which things are pressed into each other before [m].
+          planned: As the plan was made for.
           rng: Draws.
         """
         errors = {"object_shift_cm": 0.0, "object_turn_deg": 0.0}
         most = self._variation.object_shift_cm, self._variation.object_turn_deg
         if most == (0.0, 0.0):
             return start, errors
+        if self._pressed is None:
+            self._pressed = self.depth(planned)
         with self._standing(start):
             for number, name in enumerate(start.objects):
                 for _ in range(_TRIES):
@@ -164,7 +166,7 @@ class Varied:
                     shift = distance / 100 * np.array([np.cos(direction), np.sin(direction), 0.0])
                     other = _with_object_moved(start, name, shift, radians(turn))
                     self._place(other.objects[name])
-                    if self._depth() <= depth + _DEEPER:
+                    if self._depth() <= self._pressed + _DEEPER:
                         start = other
                         if number == 0:
                             errors = {"object_shift_cm": distance, "object_turn_deg": turn}
