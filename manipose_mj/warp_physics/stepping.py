@@ -13,7 +13,9 @@ import warp as wp  # pyright: ignore[reportMissingImports]
 from mujoco_warp._src import forward, smooth  # pyright: ignore[reportMissingImports]
 
 from manipose_mj.warp_physics.collisions import Collisions, can_find
+from manipose_mj.warp_physics.frames import Frames
 from manipose_mj.warp_physics.newton import NewtonSolver, can_solve
+from manipose_mj.warp_physics.passive import PassiveForces
 from manipose_mj.warp_physics.trees import subtree_centres, sum_subtrees
 
 
@@ -39,6 +41,8 @@ class Stepper:
         if self.fused:
             self._solver = NewtonSolver(model, data)
             self._collisions = Collisions(model, data)
+            self._frames = Frames(model, data)
+            self._passive = PassiveForces(model, data)
             self._armoured = bool(model.ntendon) and bool(model.tendon_armature.numpy().any())
             parents = tuple(model.body_parentid.numpy().tolist())
             self._find_centres = subtree_centres(parents)
@@ -74,7 +78,7 @@ class Stepper:
     def _find_positions(self) -> None:
         """`mujoco_warp.fwd_position`, but for cameras, lights and the factor of the inertia."""
         m, d = self._model, self._data
-        mjw.kinematics(m, d)
+        self._frames.find()
         masses = [m.body_mass, m.body_subtreemass, _floats(d.xipos)]
         subtrees = [_floats(d.subtree_com)]
         wp.launch(self._find_centres, (d.nworld, 3), inputs=masses, outputs=subtrees)
@@ -114,7 +118,7 @@ class Stepper:
                 outputs=[d.ten_velocity],
             )
         mjw.com_vel(m, d)
-        mjw.passive(m, d)
+        self._passive.find()
         smooth._rne_cacc_world(m, d)
         smooth._rne_cacc_forward(m, d)
         smooth._rne_cfrc(m, d)
