@@ -1,9 +1,10 @@
 """The physics step of batched worlds: MuJoCo Warp's, with fewer kernels where one does the work of many.
 
-A step of a box's scene is 142 kernels and clearings in MuJoCo Warp, and 68 here; for a few thousand worlds each takes
+A step of a box's scene is 142 kernels and clearings in MuJoCo Warp, and 64 here; for a few thousand worlds each takes
 some microseconds, whatever it does. Gone are those of the solver's iterations (`newton`), those of each level of the
 kinematic tree (`trees`), and those that find accelerations without contacts, which `newton` does not need. What is near
-each other is found by `collisions`.
+each other is found by `collisions`, where things are by `frames`, and what springs, dampers and borne weights exert by
+`passive`.
 """
 
 from typing import Any
