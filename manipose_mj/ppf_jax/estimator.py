@@ -233,7 +233,13 @@ def prepared_sample(
 
 
 def bucket(count: int) -> int:
-    """The padded size of a cloud of `count` points, at most `MAX_POINTS`."""
+    """The padded size of a cloud of `count` points.
+
+    Raises:
+      InputError: They are more than `MAX_POINTS`.
+    """
+    if count > BUCKETS[-1]:
+        raise InputError(f"cloud of {count} points; expected at most {BUCKETS[-1]}")
     return next(size for size in BUCKETS if count <= size)
 
 

@@ -60,6 +60,11 @@ def test_one_compilation_for_clouds_of_all_sizes(trained, mug, monkeypatch):
     assert traced == [CONFIG.points]
 
 
+def test_clouds_of_more_points_than_are_kept_have_no_padded_size():
+    with pytest.raises(InputError, match="cloud of 1025 points; expected at most 1024"):
+        bucket(1025)
+
+
 @pytest.mark.full
 def test_one_object_is_estimated_as_by_the_whole_model(trained, mug):
     found = PoseEstimator(trained).estimate(mug, key=KEY)

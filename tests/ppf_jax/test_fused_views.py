@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -10,6 +11,7 @@ import jax
 import numpy as np
 import pytest
 
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, compose, invert, pose_error, rotation_about, transform
 from manipose_mj.ppf_jax.data.rendering import render_clouds
@@ -18,6 +20,8 @@ from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.fused_views import FusedViewEstimator, fused_cloud
 from manipose_mj.ppf_jax.points.cloud_input import Cloud
+from manipose_mj.ppf_jax.points.clouds import MAX_POINTS
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 
 KEY = jax.random.key(0)
 COMMON = compose(rotation_about(np.array([0.0, 0, 1]), 0.7), np.array([0.3, -0.2, 0.1]))
@@ -111,6 +115,30 @@ def test_a_fused_cloud_that_cannot_be_used_is_one_line(views, frames):
     bad[0] = np.nan
     with pytest.raises(InputError, match="cloud 2: 1 of .* points are not finite"):
         estimator.estimate_views([*views[:2], bad], frames, key=KEY)
+
+
+def test_clouds_of_more_points_than_one_camera_keeps_are_evaluated_and_timed(
+    views, monkeypatch, capsys
+):
+    """Seven cameras see up to 1,792 points, more than `MAX_POINTS`."""
+    rng = np.random.default_rng(0)
+    points, normals = (np.tile(rows, (9, 1)) for rows in (views[0].points, views[0].normals))
+    points = points + rng.normal(0, 1e-4, points.shape).astype(np.float32)
+    large = replace(views[0], points=points, normals=normals, eyes=np.zeros_like(points))
+    assert len(large) > MAX_POINTS
+    asked = []
+
+    def found(self, cloud, *, key):
+        asked.append(cloud)
+        return PoseEstimate(np.asarray(cloud.pose), np.ones(3), 0.5)
+
+    monkeypatch.setattr(FusedViewEstimator, "estimate_fused", found)
+    monkeypatch.setattr("manipose_mj.cli.pose.clouds.catalogue_clouds", lambda *_, **__: [large])
+    words = ["--setting", "several_tasks", "--views", "1", "--jobs", "1", "--json"]
+    assert main(["pose", "evaluate", "cup", *words]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["n"] == 1 and row["ms_per_object"] >= 0
+    assert len(asked) == 3 and all(each is large for each in asked)  # once, compiled and timed
 
 
 def test_what_one_camera_sees_once_counts_once(views, frames):

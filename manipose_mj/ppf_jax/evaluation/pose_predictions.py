@@ -17,7 +17,8 @@ from manipose_mj.poses import invert, transform
 from manipose_mj.ppf_jax.data.view_cache import catalogue_subject
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.fused_views import FusedViewEstimator
-from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, LabelledCloud
+from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 _TIMED, _TIMED_S = (
@@ -58,6 +59,9 @@ def predict(
       batch: Clouds at the same time.
       seed: Of what the estimator draws; each cloud's share depends on its place in the list.
       timed: Clouds that are estimated once more, one by one, for the time; NaN if none are.
+
+    Raises:
+      InputError: A cloud cannot be used, such as one of several cameras by an estimator of single ones.
     """
     found, batch = [], min(batch, len(clouds))
     for start in range(0, len(clouds), batch):
@@ -77,14 +81,25 @@ def _one_by_one(
     estimator: PoseEstimator | TwoNetworkFusion | FusedViewEstimator,
     clouds: Sequence[LabelledCloud],
 ) -> float:
-    """Median milliseconds for one object's bare points, from which normals are estimated."""
+    """Median milliseconds for one object's bare points, from which normals are estimated.
+
+    Of several cameras the cloud is timed as it is: without their places and normals none is one.
+    """
     key = jax.random.key(0)
-    for sized in {bucket(len(cloud)): cloud for cloud in clouds}.values():
-        estimator.estimate(sized.points, key=key)  # compiles
+
+    def estimate(cloud: LabelledCloud) -> PoseEstimate:
+        if isinstance(estimator, FusedViewEstimator):
+            return estimator.estimate_fused(cloud, key=key)
+        return estimator.estimate(cloud.points, key=key)
+
+    fused = isinstance(estimator, FusedViewEstimator)  # all of its clouds have one size
+    sizes = {0 if fused else bucket(min(len(cloud), MAX_POINTS)): cloud for cloud in clouds}
+    for sized in sizes.values():
+        estimate(sized)  # compiles
     spent = []
     for cloud in clouds:
         begin = time.perf_counter()
-        estimator.estimate(cloud.points, key=key)
+        estimate(cloud)
         spent.append(time.perf_counter() - begin)
         if sum(spent) > _TIMED_S:
             break
