@@ -134,7 +134,7 @@ class PoseEstimator:
           key: Of all that is drawn; the same key gives the same answer.
 
         Raises:
-          InputError: The cloud is no cloud of an object in metres; one line says why.
+          InputError: The cloud is no cloud of an object in metres, or of several cameras; one line says why.
         """
         model = self.trained.model
         if not isinstance(model, PoseModel):
@@ -267,6 +267,10 @@ def _sample_rows(model: PoseModel, mask: Bool[Array, "n"], *, key: PRNGKeyArray)
 def _checked(cloud: AnyCloud, key: PRNGKeyArray) -> tuple[np.ndarray, np.ndarray | None]:
     """At most `MAX_POINTS` points and their unit normals, towards the camera; None without any."""
     seeds = seeds_of(key)
+    if np.any(getattr(cloud, "eyes", None)):
+        raise InputError(
+            "cloud of several cameras (it has eyes); expected what one sees: FusedViewEstimator takes it"
+        )
     points, normals = checked_cloud(
         cloud, fewest=MIN_POINTS, shortest=SHORTEST, longest=LONGEST, what="an object"
     )

@@ -18,10 +18,13 @@ from manipose_mj.ppf_jax.data.rendering import render_clouds
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, catalogue_subject
 from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
+from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
 from manipose_mj.ppf_jax.fused_views import FusedViewEstimator, fused_cloud
+from manipose_mj.ppf_jax.multi_view import score_together
 from manipose_mj.ppf_jax.points.cloud_input import Cloud
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
+from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 KEY = jax.random.key(0)
 COMMON = compose(rotation_about(np.array([0.0, 0, 1]), 0.7), np.array([0.3, -0.2, 0.1]))
@@ -115,6 +118,22 @@ def test_a_fused_cloud_that_cannot_be_used_is_one_line(views, frames):
     bad[0] = np.nan
     with pytest.raises(InputError, match="cloud 2: 1 of .* points are not finite"):
         estimator.estimate_views([*views[:2], bad], frames, key=KEY)
+
+
+@pytest.mark.parametrize("cameras", ["one", "several"])
+def test_clouds_of_several_cameras_are_for_their_estimator(views, frames, cameras):
+    """Without the cameras' places they would be taken for what one sees."""
+    cloud, _ = fused_cloud(views, frames, rng=np.random.default_rng(0))
+    labelled = replace(views[0], points=cloud.points, normals=cloud.normals, eyes=cloud.eyes)
+    single = PoseEstimator.load("cup", cameras=cameras)
+    words = "cloud of several cameras .*: FusedViewEstimator takes it"
+    with pytest.raises(InputError, match=words):
+        single.estimate(cloud, key=KEY)
+    for estimator in (single, TwoNetworkFusion(single, single)):
+        with pytest.raises(InputError, match=words):
+            predict(estimator, [labelled])
+    with pytest.raises(InputError, match=f"cloud 0: {words}"):
+        score_together(single, [labelled, views[0]], frames[:2], key=KEY)
 
 
 def test_clouds_of_more_points_than_one_camera_keeps_are_evaluated_and_timed(
