@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +23,10 @@ from manipose_mj.console.process import CORES, one_thread_per_process
 
 one_thread_per_process()
 
+from pose_tables.options import check_files, check_folder, write_rows  # noqa: E402
+
 from manipose_mj.control.furniture.furniture_estimator import FurnitureEstimator  # noqa: E402
+from manipose_mj.errors import InputError  # noqa: E402
 from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator, PartEstimate  # noqa: E402
 from manipose_mj.ppf_jax.data.articulated.assets import asset_scenes  # noqa: E402
 from manipose_mj.ppf_jax.data.articulated.cache import furniture_names, furniture_scenes  # noqa: E402
@@ -37,7 +41,8 @@ from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors, part_errors,
 _WORST = 10
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the rows; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--weights", type=Path, help="of the package without it")
     parser.add_argument("--assets", type=Path, help="folder of built articulated assets")
@@ -46,7 +51,18 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=CORES)
     parser.add_argument("--json", type=Path, help="write the rows here")
     parser.add_argument("--pictures", type=Path, help="draw the worst views into this folder")
-    options = parser.parse_args()
+    options = parser.parse_args(argv)
+    try:
+        check_files(options.json)
+        check_folder(options.pictures)
+        _measure(options)
+    except InputError as error:
+        print(f"articulated_table: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _measure(options: argparse.Namespace) -> None:
     if options.weights is None:
         estimator = ArticulatedEstimator.load()
     else:
@@ -64,7 +80,7 @@ def main() -> None:
             for name, (finder, least) in finders.items():
                 rows += _rows(name, finder, least, which, scenes, fused, options.pictures)
                 if options.json is not None:
-                    options.json.write_text(json.dumps(rows, indent=1) + "\n")
+                    write_rows(options.json, rows)
 
 
 class _Fitted:
@@ -186,4 +202,4 @@ def _lines(plot, handle, origin, axis, hinge: bool, colours: tuple[str, str, str
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

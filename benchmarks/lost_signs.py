@@ -11,7 +11,6 @@ equivalent true poses, it points backwards.
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 from collections.abc import Sequence
@@ -20,14 +19,14 @@ from typing import get_args
 
 import numpy as np
 from pose_table import PAPER, WEIGHTS, estimator_of
+from pose_tables.options import check_categories, check_files, one_camera_setting, write_rows
 from rich.console import Console
 from rich.table import Table
 
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, pose_error, rotation_angle
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.data.view_settings import view_setting
-from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
+from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.weight_files import MethodName
 
@@ -92,9 +91,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     table = Table("category", "setting", "views", "deg", "signs given", "X reversed", "Y reversed")
     rows: list[Row] = []
     try:
-        settings = [view_setting(name) for name in options.settings]
+        settings = [one_camera_setting(name) for name in options.settings]
+        check_categories(options.categories)
+        check_files(options.json)
         for category in options.categories:
-            categories_of(category)
             estimator = estimator_of(category, options.weights, options.method, "unified")
             if estimator is None:
                 continue
@@ -115,12 +115,12 @@ def main(argv: Sequence[str] | None = None) -> int:
                     f"{row['x_reversed']:.0%}",
                     f"{row['y_reversed']:.0%}",
                 )
+        Console(width=None if sys.stdout.isatty() else 120).print(table)
+        if options.json is not None:
+            write_rows(options.json, rows)
     except InputError as error:
         print(f"lost_signs: {error}", file=sys.stderr)
         return 2
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
-    if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return 0
 
 

@@ -12,7 +12,6 @@ keep fewer points than an estimator accepts are left out and counted. Exits with
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -20,13 +19,19 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from pose_tables.options import (
+    check_categories,
+    check_files,
+    network_of,
+    one_camera_setting,
+    write_rows,
+)
 from rich.console import Console
 from rich.table import Table
 
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.data.augmentation.corruption import partly_hidden, with_outliers
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import MIN_POINTS, PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors, summary
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
@@ -155,25 +160,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     rows: list[Row] = []
     try:
-        setting = view_setting(options.setting)
-        for category in options.categories:
-            if options.weights is None:
-                estimator = PoseEstimator.load(category)
-            else:
-                estimator = PoseEstimator.from_file(options.weights / category / "weights.npz")
+        setting = one_camera_setting(options.setting)
+        check_categories(options.categories)
+        check_files(options.json, options.picture)
+        estimators = {name: network_of(name, options.weights) for name in options.categories}
+        for category, estimator in estimators.items():
             clouds = catalogue_clouds(
                 category, "test", setting, views=options.views, jobs=options.jobs
             )
             for kind, (_, shares) in KINDS.items():
                 rows += [row_of(category, kind, share, estimator, clouds) for share in shares]
+        Console(width=None if sys.stdout.isatty() else 150).print(table_of(rows))
+        if options.json is not None:
+            write_rows(options.json, [asdict(row) for row in rows])
     except InputError as error:
         print(f"pose_robustness: {error}", file=sys.stderr)
         return 2
-    Console(width=None if sys.stdout.isatty() else 150).print(table_of(rows))
     if options.picture is not None:
         draw(options.picture, rows)
-    if options.json is not None:
-        options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
     broken = [f"{row.category}, {row.share:.0%} {row.kind}" for row in rows if not row.finite]
     print(f"not finite: {'; '.join(broken)}" if broken else "every answer is finite")
     return 1 if broken else 0

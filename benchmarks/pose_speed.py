@@ -14,7 +14,6 @@ one on a GPU.
 from __future__ import annotations
 
 import argparse
-import json
 import resource
 import sys
 import time
@@ -29,6 +28,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from pose_matchers import available, template
+from pose_tables.options import check_categories, check_files, write_rows
 from scipy.spatial.transform import Rotation
 
 from manipose_mj.console.process import compile_at_once_on_gpus
@@ -192,6 +192,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     parts = options.parts or (PARTS if jax.default_backend() == "cpu" else PARTS[1:])
     try:
+        check_categories([options.category])
+        check_files(options.json)
         if options.weights is None:
             estimator = PoseEstimator.load(options.category)
         else:
@@ -228,7 +230,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"fit: {constant:.2f} ms + {slope:.2f} ms per 1,000 pairs, within {off:.1%}")
         rows.append({"part": "fit", "ms": constant, "ms_per_1000_pairs": slope, "off": off})
     if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n")
+        try:
+            write_rows(options.json, rows)
+        except InputError as error:
+            print(f"pose_speed: {error}", file=sys.stderr)
+            return 2
     return 0
 
 

@@ -25,7 +25,6 @@ seconds an object: all of it about an hour on two cores.
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 import time
@@ -35,6 +34,7 @@ from typing import Any
 
 import numpy as np
 from pose_matchers import Matcher, available, template
+from pose_tables.options import check_categories, check_files, one_camera_setting, write_rows
 from rich.console import Console
 from rich.table import Table
 
@@ -43,13 +43,11 @@ from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
 from manipose_mj.ppf_jax.data.source_frames import SourceLabel
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds, source_labels
-from manipose_mj.ppf_jax.data.view_settings import view_setting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_metrics import pose_errors, summary
 from manipose_mj.ppf_jax.evaluation.pose_predictions import (
     Predictions,
     catalogue_hulls,
-    categories_of,
     predict,
 )
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
@@ -215,9 +213,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parser.parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="%(message)s")
     try:
-        setting = view_setting(options.setting)
-        for category in options.categories:
-            categories_of(category)
+        setting = one_camera_setting(options.setting)
+        check_categories(options.categories)
+        check_files(options.json)
         matchers, lacking = ({}, {}) if options.no_matchers else available()
         for name, why in lacking.items():
             log.warning("%s: left out (%s; extra pose-bench)", name, why)
@@ -231,13 +229,13 @@ def main(argv: Sequence[str] | None = None) -> int:
                 for row in rows_of(category, clouds, options.weights, matchers, options.jobs):
                     rows.append({**row, "setting": options.setting})
                     status.update(f"{category}: after {row['method']}, {row['labels']} labels")
+        width = None if sys.stdout.isatty() else 160
+        Console(width=width).print(table_of(rows, options.setting))
+        if options.json is not None:
+            write_rows(options.json, rows)
     except InputError as error:
         print(f"pose_table: {error}", file=sys.stderr)
         return 2
-    width = None if sys.stdout.isatty() else 160
-    Console(width=width).print(table_of(rows, options.setting))
-    if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return 0
 
 

@@ -16,7 +16,6 @@ category's label leaves them open. Exits with 1 if a scan of a kind that the cat
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 from collections.abc import Sequence
@@ -26,6 +25,13 @@ from pathlib import Path
 import numpy as np
 from pictures.scan_pictures import draw_view
 from pose_table import PAPER
+from pose_tables.options import (
+    check_files,
+    check_folder,
+    network_of,
+    one_camera_setting,
+    write_rows,
+)
 from rich.console import Console
 from rich.table import Table
 
@@ -35,7 +41,7 @@ from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
 from manipose_mj.ppf_jax.data.asset_views import views_of
-from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
+from manipose_mj.ppf_jax.data.view_settings import ViewSetting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_metrics import PoseErrors, pose_errors, summary
 from manipose_mj.ppf_jax.evaluation.pose_predictions import predict
@@ -103,9 +109,7 @@ def estimator_of(
 
 def _network(name: str, weights: Path | None) -> PoseEstimator | None:
     try:
-        if weights is None:
-            return PoseEstimator.load(name)
-        return PoseEstimator.from_file(weights / name / "weights.npz")
+        return network_of(name, weights)
     except InputError:
         return None
 
@@ -277,21 +281,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if options.views < 1:
             raise InputError(f"--views is {options.views}; expected at least 1")
-        setting = view_setting(options.setting)
+        setting = one_camera_setting(options.setting)
+        check_files(options.json)
+        check_folder(options.pictures)
         rows, clouds, poses, errors = measured(
             scans(options.assets, options.only), setting, options
         )
+        width = None if sys.stdout.isatty() else 170
+        Console(width=width).print(table_of(rows, options.setting))
+        if options.json is not None:
+            write_rows(options.json, [asdict(row) | {"within": row.within} for row in rows])
     except InputError as error:
         print(f"real_scan_table: {error}", file=sys.stderr)
         return 2
-    width = None if sys.stdout.isatty() else 170
-    Console(width=width).print(table_of(rows, options.setting))
     if options.pictures is not None:
         for line in draw_worst(options.pictures, options.worst, clouds, poses, errors):
             print(line)
-    if options.json is not None:
-        written = [asdict(row) | {"within": row.within} for row in rows]
-        options.json.write_text(json.dumps(written, indent=1) + "\n")
     missed = [row.scan for row in rows if row.in_catalogue and not row.within]
     print(f"missed: {', '.join(missed)}" if missed else "all bars met")
     return 1 if missed else 0

@@ -14,19 +14,19 @@ the catalogue, unified labels. Bars: the median errors, averaged over the catego
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from pose_tables.options import check_files, network_of, one_camera_setting, write_rows
 from rich.console import Console
 from rich.table import Table
 
 from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.data.view_cache import catalogue_clouds
-from manipose_mj.ppf_jax.data.view_settings import ViewSetting, view_setting
+from manipose_mj.ppf_jax.data.view_settings import ViewSetting
 from manipose_mj.ppf_jax.estimator import PoseEstimator
 from manipose_mj.ppf_jax.evaluation.pose_metrics import most_confident, pose_errors, summary
 from manipose_mj.ppf_jax.evaluation.pose_predictions import RIGID_TYPES, categories_of, predict
@@ -179,26 +179,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(*LEFT_OUT[options.leave_out])
         return 0
     try:
-        setting = view_setting(options.setting)
+        setting = one_camera_setting(options.setting)
+        check_files(options.json)
+        estimators = {name: network_of(name, options.weights) for name in options.types}
         rows: list[Row] = []
-        for name in options.types:
-            if options.weights is None:
-                estimator = PoseEstimator.load(name)
-            else:
-                estimator = PoseEstimator.from_file(options.weights / name / "weights.npz")
+        for name, estimator in estimators.items():
             rows += rows_of(name, estimator, setting, options.views, options.jobs)
+        Console(width=None if sys.stdout.isatty() else 120).print(table_of(rows, options.setting))
+        verdicts = [verdict_of([r for r in rows if r.object_type == name]) for name in estimators]
+        for verdict in verdicts:
+            print(
+                f"{verdict.object_type}: means of medians: trained on {_said(verdict.seen)}; "
+                f"unseen {_said(verdict.unseen)}"
+            )
+        if options.json is not None:
+            write_rows(options.json, [asdict(row) for row in rows])
     except InputError as error:
         print(f"type_table: {error}", file=sys.stderr)
         return 2
-    Console(width=None if sys.stdout.isatty() else 120).print(table_of(rows, options.setting))
-    verdicts = [verdict_of([r for r in rows if r.object_type == name]) for name in options.types]
-    for verdict in verdicts:
-        print(
-            f"{verdict.object_type}: means of medians: trained on {_said(verdict.seen)}; "
-            f"unseen {_said(verdict.unseen)}"
-        )
-    if options.json is not None:
-        options.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
     beyond = missed(rows, verdicts)
     print(f"missed: {'; '.join(beyond)}" if beyond else "all bars met")
     return 1 if beyond else 0

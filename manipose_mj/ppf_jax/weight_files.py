@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
@@ -22,7 +20,7 @@ from manipose_mj.ppf_jax.articulated.model import ArticulatedConfig, Articulated
 from manipose_mj.ppf_jax.cppf.model import CppfModel
 from manipose_mj.ppf_jax.cppf.voting import CppfConfig
 from manipose_mj.ppf_jax.rigid.model import EstimatingModel, ModelConfig, PoseModel
-from manipose_mj.storage.staging import staging
+from manipose_mj.storage.staging import replacing
 
 FORMAT_VERSION = 2  # of the configuration's names and of the arrays' order
 _HEADER = "header"
@@ -132,15 +130,6 @@ def load_weights(path: Path) -> TrainedModel:
         raise InputError(f"{path}: weights that are not finite; copy it again or train again")
     model = jax.tree.unflatten(structure, [jnp.asarray(a, jnp.float32) for a in arrays])
     return TrainedModel(model, categories, labels, cameras)
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A scratch path that takes the place of `path` at once when all went well."""
-    with staging(path) as folder:
-        scratch = folder / path.name
-        yield scratch
-        os.replace(scratch, path)
 
 
 def _config(kind: Any, stored: dict[str, Any]) -> Any:

@@ -1,4 +1,4 @@
-"""Build a folder aside, and put it where it belongs by one rename."""
+"""Build a folder or a file aside, and put it where it belongs by one rename."""
 
 from __future__ import annotations
 
@@ -31,6 +31,19 @@ def staging(folder: Path) -> Iterator[Path]:
             yield path
     finally:
         shutil.rmtree(path, ignore_errors=True)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A scratch path that takes the place of the file `path` at once when all went well.
+
+    Raises:
+      OSError: It cannot be written.
+    """
+    with staging(path) as folder:
+        scratch = folder / path.name
+        yield scratch
+        os.replace(scratch, path)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from manipose_mj.ppf_jax.points.clouds import CloudBatch
 from manipose_mj.ppf_jax.points.symmetry import nearest_equivalent
 from manipose_mj.ppf_jax.rigid.model import Estimates, EstimatingModel, PoseModel, estimate_batch
 from manipose_mj.ppf_jax.training.losses import LossConfig
-from manipose_mj.ppf_jax.weight_files import replacing
+from manipose_mj.storage.staging import replacing
 
 log = logging.getLogger(__name__)
 
