@@ -33,6 +33,22 @@ def test_means_and_medians_have_to_be_within(table):
     assert [row.within for row in (within, far, turned)] == [True, False, False]
 
 
+def test_bars_that_do_not_count_are_told(table):
+    """A flat bottle is of a category of round objects: the catalogue has none of its type."""
+    figures = (10, 0.5, 0.2, 4.0, 2.0, 4.0, 90.0, 0.0, 0.57)
+    cup = table.Row("a", "cup", "cup", True, *figures, 4.1)
+    flat = table.Row("flat", "bottle", "axial, mirror", False, *figures, 3.0)
+    ball = table.Row("ball", "ball", "mirror", False, *figures, 4.1)
+    told, last = table.verdict([cup, flat, ball])
+    assert told.startswith("bars of 2 scans not counted")
+    assert told.endswith(": flat (missed), ball (met)")
+    assert last == "all bars of 1 counted scans met"
+    assert table.verdict([cup]) == [last]
+    assert table.verdict([flat])[1] == "no bar counts"
+    far = table.Row("b", "cup", "cup", True, *figures, 3.0)
+    assert table.verdict([cup, far]) == ["missed: b"]
+
+
 def test_a_carton_with_a_front_is_none_of_the_boxes(table):
     boxes = PoseEstimator.load("box")
     assert table.fits(SymmetryGroup.three_planes(), boxes)
