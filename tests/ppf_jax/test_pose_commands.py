@@ -23,9 +23,9 @@ from manipose_mj.ppf_jax.points.clouds import LabelledCloud
 from manipose_mj.ppf_jax.training.curve_picture import draw_curve
 from tests.ppf_jax.catalogue_assets import write_asset
 
-CUP, BOWL = (
+CUP, BOWL, AXIAL, FURNITURE = (
     str(resources.files("manipose_mj.ppf_jax") / "weights" / f"{name}.npz")
-    for name in ("cup", "bowl")
+    for name in ("cup", "bowl", "axial", "furniture")
 )
 
 
@@ -47,16 +47,35 @@ CUP, BOWL = (
         (["pose", "train-articulated", "--asset-scenes", "0"], "--asset-scenes is 0"),
         (["pose", "train", "mug", "--part-swaps", "2"], "objects are made of two of mug"),
         (["pose", "train", "axial", "--part-swaps", "2", "--labels", "original"], "no source has"),
+        (
+            ["pose", "train", "cup", "--method", "cppf", "--start-from", CUP],
+            "cup.npz: weights of method ours; expected cppf",
+        ),
+        (
+            ["pose", "train", "cup", "--start-from", FURNITURE],
+            "of method articulated; expected ours",
+        ),
+        (
+            ["pose", "train", "cup", "--start-from", AXIAL],
+            "axial.npz: weights of networks of other",
+        ),
+        (["pose", "train", "axial", "--start-from", CUP], "cup.npz: weights of networks of other"),
+        (
+            ["pose", "train-articulated", "--start-from", CUP],
+            "of method ours; expected articulated",
+        ),
         (["pose", "evaluate", "mug", "--weights", "none.npz"], "none.npz"),
         (["pose", "average", "a.npz", "--out", "b.npz"], "1 files of weights"),
         (["pose", "average", CUP, "none.npz", "--out", "b.npz"], "none.npz: no such file"),
         (["pose", "average", CUP, BOWL, "--out", "b.npz"], "weights of ours, bowl, unified"),
     ],
 )
-def test_wrong_input_is_one_line(command, message, capsys):
+def test_wrong_input_is_one_line(command, message, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     assert main(command) == 2
     said = capsys.readouterr().err
     assert message in said and said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_type_is_all_its_rigid_categories():

@@ -8,7 +8,14 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
-from manipose_mj.cli.pose.train import CURVE_PICTURE, WEIGHTS_FILE, file_digest, require_positive
+from manipose_mj.cli.pose.train import (
+    CURVE_PICTURE,
+    WEIGHTS_FILE,
+    check_sizes,
+    file_digest,
+    require_positive,
+    starting_weights,
+)
 from manipose_mj.console.process import CORES, prepare_workers
 from manipose_mj.errors import InputError
 
@@ -81,9 +88,11 @@ def train_articulated(
     from manipose_mj.ppf_jax.training.articulated_losses import ArticulatedLoss
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, TrainingConfig, train
-    from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
+    from manipose_mj.ppf_jax.weight_files import TrainedModel, save_weights
 
-    initial = None if start_from is None else load_weights(start_from).model
+    initial = starting_weights(start_from, "articulated")
+    if initial is not None:
+        check_sizes(start_from, initial, ArticulatedConfig(), ArticulatedModel)
     objects = furniture_names("train", further, synthetic)
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(

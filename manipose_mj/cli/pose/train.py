@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
@@ -70,7 +71,8 @@ def train_pose(
       steps: In all.
       minutes: Ends the training, cooled down, if the steps do not.
       seed: Of the first weights and of all that training draws.
-      start_from: Weights of an earlier training to start from, instead of random ones.
+      start_from: Weights of an earlier training to start from, instead of random ones; of the same method, and of
+        a category where one is trained, else of a type.
       jobs: Processes that render.
     """
     prepare_workers(jobs)
@@ -89,13 +91,20 @@ def train_pose(
     from manipose_mj.ppf_jax.data.view_cache import batch_stream
     from manipose_mj.ppf_jax.data.view_settings import view_setting
     from manipose_mj.ppf_jax.points.symmetry import common_symmetry
+    from manipose_mj.ppf_jax.rigid.model import PoseModel
+    from manipose_mj.ppf_jax.rigid.model_sizes import category_config, type_config
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, train
     from manipose_mj.ppf_jax.training.methods import METHODS
-    from manipose_mj.ppf_jax.weight_files import TrainedModel, load_weights, save_weights
+    from manipose_mj.ppf_jax.weight_files import TrainedModel, save_weights
 
-    initial = None if start_from is None else load_weights(start_from).model
+    initial = starting_weights(start_from, method)
     source = PoseClouds(name, leave_out=leave_out, labels=labels, jobs=jobs)
+    if initial is not None and method == "ours" and not leave_out:
+        # As `model_config` will choose, of what is rendered.
+        alone = source.categories == (name,) and not asset_part_swaps
+        sized = category_config if alone else type_config
+        check_sizes(start_from, initial, sized(initial.config.symmetry), PoseModel)
     several = any(view_setting(each).cameras != (1, 1) for each in setting)
     made_of_two = source.part_swapped(part_swaps, SEVERAL if several else "training")
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
@@ -115,6 +124,8 @@ def train_pose(
         1 + checks * batch // source.objects("test"),
     )
     config = chosen.configured(clouds)
+    if initial is not None:
+        check_sizes(start_from, initial, config, chosen.build)
     stream = batch_stream(held_out, batch, seed, points=config.points)(0)
     feed = batch_stream(clouds, batch, seed, points=config.points)
     folder = Path("pose") / folder_name(name, method, labels) if out is None else out
@@ -167,6 +178,37 @@ def folder_name(name: str, method: str, labels: str) -> str:
     parts += [method] if method != "ours" else []
     parts += [labels] if labels != "unified" else []
     return "-".join(parts)
+
+
+def starting_weights(path: Path | None, method: str) -> Any:
+    """The model of an earlier training to start from; None of none.
+
+    Raises:
+      InputError: The file is none of weights, or of those of another method.
+    """
+    if path is None:
+        return None
+    from manipose_mj.ppf_jax.weight_files import load_weights
+
+    trained = load_weights(path)
+    if trained.method != method:
+        raise InputError(f"{path}: weights of method {trained.method}; expected {method}")
+    return trained.model
+
+
+def check_sizes(path: Path | None, initial: Any, config: Any, build: Callable[..., Any]) -> None:
+    """Raises InputError, with the file that they are of, for weights of other sizes than `build(config)` has."""
+    import numpy as np
+
+    from manipose_mj.ppf_jax.training.loop import with_weights_of
+
+    try:
+        with_weights_of(build(config, rng=np.random.default_rng(0)), initial)
+    except InputError:
+        raise InputError(
+            f"{path}: weights of networks of other sizes; expected those of a training of the same: a category's, "
+            "a type's or furniture's, by this version"
+        ) from None
 
 
 def file_digest(path: Path | None) -> str | None:

@@ -114,12 +114,12 @@ def train(
     Raises:
       InputError: The folder holds another training's state, or `initial` has other sizes.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     model = build(model_config, rng=np.random.default_rng(config.seed))
     if initial is not None:
         model = with_weights_of(model, initial)
     stated = json.loads(json.dumps(about or {}))
     state, curve, earlier = _resumed(folder, model, config, stated)
+    folder.mkdir(parents=True, exist_ok=True)
     start = int(state.step)
     began = saved = time.monotonic()
     parts: dict[str, Array] = {}

@@ -176,6 +176,13 @@ def test_no_time_means_no_steps(bowls, model_config, tmp_path):
     assert json.loads((tmp_path / CURVE_FILE).read_text()) == []
 
 
+def test_weights_of_other_sizes_leave_no_folder(tmp_path):
+    folder, initial = tmp_path / "out", [np.zeros(2)]
+    with pytest.raises(InputError, match="other sizes"):
+        train(lambda _: iter(()), Tiny(), CONFIG, folder, build=Weights, initial=initial)
+    assert not folder.exists()
+
+
 @pytest.fixture
 def timed(bowls, monkeypatch, tmp_path):
     """Trains for some seconds of a clock by which each step takes one; gives the curve."""
