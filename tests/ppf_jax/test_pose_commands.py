@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from importlib import resources
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import pytest
 from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup
+from manipose_mj.ppf_jax.articulated.model import ArticulatedConfig
 from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator
 from manipose_mj.ppf_jax.data.articulated import cache
 from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator
@@ -20,7 +22,11 @@ from manipose_mj.ppf_jax.evaluation import part_evaluation
 from manipose_mj.ppf_jax.evaluation.part_metrics import PartErrors
 from manipose_mj.ppf_jax.evaluation.pose_predictions import categories_of, predict
 from manipose_mj.ppf_jax.points.clouds import LabelledCloud
+from manipose_mj.ppf_jax.training.articulated_losses import ArticulatedLoss
 from manipose_mj.ppf_jax.training.curve_picture import draw_curve
+from manipose_mj.ppf_jax.training.loop import TrainingConfig
+from manipose_mj.ppf_jax.training.methods import METHODS
+from manipose_mj.ppf_jax.training.saved_state import STATE_FILE
 from tests.ppf_jax.catalogue_assets import write_asset
 
 CUP, BOWL, AXIAL, FURNITURE = (
@@ -76,6 +82,35 @@ def test_wrong_input_is_one_line(command, message, capsys, monkeypatch, tmp_path
     said = capsys.readouterr().err
     assert message in said and said.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "configs", "told"),
+    [
+        (
+            ("train", "cup"),
+            (ArticulatedConfig(), METHODS["ours"].training),
+            "--views None (now 256)",
+        ),
+        (
+            ("train-articulated", "--seed", "3"),
+            (ArticulatedConfig(), TrainingConfig(loss=ArticulatedLoss())),  # type: ignore[arg-type]
+            "seed 0 (now 3)",
+        ),
+    ],
+)
+def test_a_training_of_other_options_is_refused_before_it_renders(
+    command, configs, told, tmp_path, monkeypatch, capsys
+):
+    for module in ("pose.clouds.catalogue_clouds", "pose.articulated.evaluate_articulated"):
+        monkeypatch.setattr(f"manipose_mj.cli.{module}", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(cache, "furniture_scenes", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr("manipose_mj.ppf_jax.training.saved_state._TOLD", 20)
+    header = {"config": [dataclasses.asdict(each) for each in configs], "about": {}}
+    (tmp_path / STATE_FILE).write_text(json.dumps(header) + "\n")
+    assert main(["pose", *command, "--out", str(tmp_path), "--jobs", "1"]) == 2
+    said = capsys.readouterr().err
+    assert f"{tmp_path}/{STATE_FILE}: the state of a training with" in said and told in said
 
 
 def test_a_type_is_all_its_rigid_categories():

@@ -87,12 +87,30 @@ def train_articulated(
     from manipose_mj.ppf_jax.evaluation.part_evaluation import calibrated, scene_clouds
     from manipose_mj.ppf_jax.training.articulated_losses import ArticulatedLoss
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
-    from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, TrainingConfig, train
+    from manipose_mj.ppf_jax.training.loop import (
+        CURVE_FILE,
+        Row,
+        TrainingConfig,
+        train,
+    )
+    from manipose_mj.ppf_jax.training.saved_state import check_resumable
     from manipose_mj.ppf_jax.weight_files import TrainedModel, save_weights
 
     initial = starting_weights(start_from, "articulated")
     if initial is not None:
         check_sizes(start_from, initial, ArticulatedConfig(), ArticulatedModel)
+    training = TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss())  # pyright: ignore[reportArgumentType]
+    about = {
+        "--scenes": scenes,
+        "--further": further,
+        "--synthetic": synthetic,
+        "--assets": None if assets is None else digest_of(built_assets([assets])),
+        "--only": sorted(only),
+        "--asset-scenes": asset_scenes,
+        "--batch": batch,
+        "--start-from": file_digest(start_from),
+    }
+    check_resumable(out, training, about, ArticulatedConfig())
     objects = furniture_names("train", further, synthetic)
     with output.Progress("objects rendered") as progress:
         known = furniture_scenes(
@@ -125,20 +143,11 @@ def train_articulated(
         model = train(
             feed,  # pyright: ignore[reportArgumentType]
             ArticulatedConfig(),
-            TrainingConfig(steps=steps, seed=seed, loss=ArticulatedLoss()),  # pyright: ignore[reportArgumentType]
+            training,
             out,
             build=ArticulatedModel,
             initial=initial,
-            about={
-                "--scenes": scenes,
-                "--further": further,
-                "--synthetic": synthetic,
-                "--assets": None if assets is None else digest_of(built_assets([assets])),
-                "--only": sorted(only),
-                "--asset-scenes": asset_scenes,
-                "--batch": batch,
-                "--start-from": file_digest(start_from),
-            },
+            about=about,
             minutes=minutes,
             progress=show,
         )

@@ -96,6 +96,7 @@ def train_pose(
     from manipose_mj.ppf_jax.training.curve_picture import draw_curve
     from manipose_mj.ppf_jax.training.loop import CURVE_FILE, Row, train
     from manipose_mj.ppf_jax.training.methods import METHODS
+    from manipose_mj.ppf_jax.training.saved_state import check_resumable
     from manipose_mj.ppf_jax.weight_files import TrainedModel, save_weights
 
     initial = starting_weights(start_from, method)
@@ -105,6 +106,24 @@ def train_pose(
         alone = source.categories == (name,) and not asset_part_swaps
         sized = category_config if alone else type_config
         check_sizes(start_from, initial, sized(initial.config.symmetry), PoseModel)
+    chosen = METHODS[method]
+    training = replace(chosen.training, steps=steps, seed=seed)
+    folder = Path("pose") / folder_name(name, method, labels) if out is None else out
+    about = {
+        "name": name,
+        "--leave-out": sorted(leave_out),
+        "--labels": labels,
+        "--setting": setting,
+        "--views": views,
+        "--part-swaps": part_swaps,
+        "--assets": digest_of(built_assets(assets)),
+        "--asset-views": asset_views,
+        "--asset-part-swaps": asset_part_swaps,
+        "--scan-views": [str(path.absolute()) for path in scan_views],
+        "--batch": batch,
+        "--start-from": file_digest(start_from),
+    }
+    check_resumable(folder, training, about)
     several = any(view_setting(each).cameras != (1, 1) for each in setting)
     made_of_two = source.part_swapped(part_swaps, SEVERAL if several else "training")
     clouds = [cloud for each in setting for cloud in source.rendered("train", each, views)]
@@ -115,7 +134,6 @@ def train_pose(
         clouds += source.of_assets(scans, each, asset_views)
     clouds += source.part_swapped_assets(scans, asset_part_swaps)
     clouds += source.of_scans(scan_views, known)
-    chosen = METHODS[method]
     # For the curve; nothing is chosen by them.
     checks = -(-chosen.checks // batch)
     held_out = source.rendered(
@@ -128,7 +146,6 @@ def train_pose(
         check_sizes(start_from, initial, config, chosen.build)
     stream = batch_stream(held_out, batch, seed, points=config.points)(0)
     feed = batch_stream(clouds, batch, seed, points=config.points)
-    folder = Path("pose") / folder_name(name, method, labels) if out is None else out
     with output.Progress("steps") as progress:
 
         def show(row: Row) -> None:
@@ -138,24 +155,11 @@ def train_pose(
         model = train(
             feed,
             config,
-            replace(chosen.training, steps=steps, seed=seed),
+            training,
             folder,
             build=chosen.build,
             initial=initial,
-            about={
-                "name": name,
-                "--leave-out": sorted(leave_out),
-                "--labels": labels,
-                "--setting": setting,
-                "--views": views,
-                "--part-swaps": part_swaps,
-                "--assets": digest_of(built_assets(assets)),
-                "--asset-views": asset_views,
-                "--asset-part-swaps": asset_part_swaps,
-                "--scan-views": [str(folder.absolute()) for folder in scan_views],
-                "--batch": batch,
-                "--start-from": file_digest(start_from),
-            },
+            about=about,
             held_out=[next(stream) for _ in range(checks)],
             minutes=minutes,
             progress=show,

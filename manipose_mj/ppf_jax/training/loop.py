@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import logging
 import time
@@ -24,11 +23,12 @@ from manipose_mj.ppf_jax.points.clouds import CloudBatch
 from manipose_mj.ppf_jax.points.symmetry import nearest_equivalent
 from manipose_mj.ppf_jax.rigid.model import Estimates, EstimatingModel, PoseModel, estimate_batch
 from manipose_mj.ppf_jax.training.losses import LossConfig
+from manipose_mj.ppf_jax.training.saved_state import STATE_FILE, described, state_read
 from manipose_mj.storage.staging import replacing
 
 log = logging.getLogger(__name__)
 
-STATE_FILE, CURVE_FILE = "state.eqx", "curve.json"
+CURVE_FILE = "curve.json"
 # Batches from step `start` on, so that a resumed training sees what an unbroken one would have.
 Batches = Callable[[int], Iterator[CloudBatch]]
 Row = dict[str, float]
@@ -117,7 +117,7 @@ def train(
     model = build(model_config, rng=np.random.default_rng(config.seed))
     if initial is not None:
         model = with_weights_of(model, initial)
-    stated = json.loads(json.dumps(about or {}))
+    stated = about or {}
     state, curve, earlier = _resumed(folder, model, config, stated)
     folder.mkdir(parents=True, exist_ok=True)
     start = int(state.step)
@@ -303,40 +303,18 @@ def _fresh(model: Any, config: TrainingConfig) -> TrainingState:
 
 
 def _resumed(
-    folder: Path, model: Any, config: TrainingConfig, about: dict[str, Any]
+    folder: Path, model: Any, config: TrainingConfig, about: Mapping[str, Any]
 ) -> tuple[TrainingState, list[Row], float]:
     """The state, the curve and the seconds that were spent on them."""
     fresh = _fresh(model, config)
     path = folder / STATE_FILE
     if not path.is_file():
         return fresh, [], 0.0
-    try:
-        with open(path, "rb") as file:
-            header = json.loads(file.readline())
-            if header["config"] != _described(fresh.model.config, config):
-                raise InputError(
-                    f"{path}: the state of a training with another configuration; give another folder"
-                )
-            before = header["about"]
-            others = [name for name in {**before, **about} if before.get(name) != about.get(name)]
-            if others:
-                raise InputError(
-                    f"{path}: the state of a training with other {', '.join(sorted(others))}; give another folder"
-                )
-            curve = header["curve"]
-            # States that do not say so were written soon after their last row.
-            seconds = header.get("seconds", curve[-1]["seconds"] if curve else 0.0)
-            return eqx.tree_deserialise_leaves(file, fresh), curve, float(seconds)
-    except InputError:
-        raise
-    except Exception as error:  # whatever a damaged file makes the readers raise
-        raise InputError(f"{path}: not a whole training state ({error}); remove it") from None
-
-
-def _described(model_config: Any, config: TrainingConfig) -> Any:
-    parts = (dataclasses.asdict(model_config), dataclasses.asdict(config))
-    # As it reads back: JSON has no tuples.
-    return json.loads(json.dumps(parts))
+    with state_read(path, described(config, about, fresh.model.config)) as (file, header):
+        curve = header["curve"]
+        # States that do not say so were written soon after their last row.
+        seconds = header.get("seconds", curve[-1]["seconds"] if curve else 0.0)
+        return eqx.tree_deserialise_leaves(file, fresh), curve, float(seconds)
 
 
 def _save(
@@ -344,13 +322,14 @@ def _save(
     state: TrainingState,
     curve: list[Row],
     config: TrainingConfig,
-    about: dict[str, Any],
+    about: Mapping[str, Any],
     seconds: float,
 ) -> None:
     """The state with its curve in one file, so that they cannot disagree; the curve beside it."""
+    stated = described(config, about, state.model.config)
     header = {
-        "config": _described(state.model.config, config),
-        "about": about,
+        "config": [stated["model"], stated["training"]],
+        "about": stated["about"],
         "curve": curve,
         "seconds": seconds,
     }

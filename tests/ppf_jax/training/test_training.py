@@ -21,7 +21,6 @@ from manipose_mj.ppf_jax.rigid.voting import VotingConfig
 from manipose_mj.ppf_jax.training import loop
 from manipose_mj.ppf_jax.training.loop import (
     CURVE_FILE,
-    STATE_FILE,
     TrainingConfig,
     evaluate,
     learning_rate,
@@ -29,6 +28,7 @@ from manipose_mj.ppf_jax.training.loop import (
     train,
 )
 from manipose_mj.ppf_jax.training.losses import LossConfig
+from manipose_mj.ppf_jax.training.saved_state import STATE_FILE, check_resumable
 from tests.ppf_jax.half_visible import half_visible_clouds
 
 STEPS, POINTS = 30, 64
@@ -45,6 +45,13 @@ CONFIG = TrainingConfig(
 @dataclasses.dataclass(frozen=True)
 class Tiny:
     """The configuration of `Weights`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Deep:
+    """Of another."""
+
+    depth: int = 3
 
 
 class Weights(eqx.Module):
@@ -136,9 +143,9 @@ def test_a_broken_training_goes_on_as_if_it_had_not(bowls, model_config, whole, 
     assert np.array_equal(jax.tree.leaves(finished)[0], jax.tree.leaves(again)[0])
 
     other_seed = dataclasses.replace(CONFIG, seed=5)
-    with pytest.raises(InputError, match="another configuration; give another folder"):
+    with pytest.raises(InputError, match=r"training with seed 0 \(now 5\); give the same"):
         train(_batches(bowls), model_config, other_seed, tmp_path)
-    with pytest.raises(InputError, match="training with other --views; give another folder"):
+    with pytest.raises(InputError, match=r"training with --views None \(now 8\); give"):
         train(_batches(bowls), model_config, CONFIG, tmp_path, about={"--views": 8})
     state = (tmp_path / STATE_FILE).read_bytes()
     (tmp_path / STATE_FILE).write_bytes(state[: len(state) // 2])
@@ -226,6 +233,32 @@ def test_a_state_that_does_not_say_its_seconds_is_read(timed, tmp_path):
     del old["seconds"]
     (tmp_path / STATE_FILE).write_bytes(json.dumps(old).encode() + b"\n" + rest)
     assert timed(6, breaks_at=6) == curve
+
+
+def test_a_state_of_another_training_is_refused_with_what_differs(timed, tmp_path):
+    timed(6)
+    (tmp_path / "empty").mkdir()
+    config = dataclasses.replace(CONFIG, log_every=4, save_every=1e9)
+    other = dataclasses.replace(config, seed=5, loss=LossConfig(pairs=300))
+    words = (
+        r"--views None \(now \[8\]\), loss.pairs 200 \(now 300\), seed 0 \(now 5\); give the same"
+    )
+    with pytest.raises(InputError, match=f"state.eqx: the state of a training with {words}"):
+        check_resumable(tmp_path, other, {"--views": (8,)})
+    with pytest.raises(InputError, match=r"with depth None \(now 3\)"):
+        check_resumable(tmp_path, config, {}, Deep())
+    for folder, given, model in (
+        (tmp_path, config, None),
+        (tmp_path, config, Tiny()),
+        (tmp_path / "empty", other, Deep()),
+    ):
+        check_resumable(folder, given, {}, model)
+    many = dataclasses.replace(config, seed=5, steps=7, warmup=1, log_every=2, save_every=0.5)
+    with pytest.raises(InputError, match="and 1 more; give"):
+        check_resumable(tmp_path, many, {})
+    (tmp_path / STATE_FILE).write_bytes(b"{}")
+    with pytest.raises(InputError, match="not a whole training state"):
+        check_resumable(tmp_path, config, {})
 
 
 def test_the_learning_rate_rises_holds_and_falls():
