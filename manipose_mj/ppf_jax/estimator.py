@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.assets.label import OBJECT_TYPES
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, brief, unknown_name
 from manipose_mj.ppf_jax.compilation_cache import keep_compiled
 from manipose_mj.ppf_jax.confidence import (
     Calibration,
@@ -48,6 +48,7 @@ from manipose_mj.ppf_jax.weight_files import (
 SEVERAL = "several"  # folder of the weights of networks that look through several cameras
 BUCKETS = (SAMPLE_POINTS, 512, MAX_POINTS)  # sizes that clouds are padded to; one compilation each
 MIN_POINTS = 32
+_OF_FURNITURE = ("articulated", "handle")  # types of labels that no rigid object has
 LONGEST, SHORTEST = 5.0, 1e-3  # of clouds that can be in metres [m]
 
 
@@ -78,10 +79,16 @@ class PoseEstimator:
         """
         if cameras not in ("one", "several"):
             raise unknown_name("number of cameras", str(cameras), ("one", "several"))
-        if name in CATALOGUE and CATALOGUE[name].object_type == "articulated":
-            raise InputError(f"{name}: furniture has handles and joints; see FurnitureEstimator")
+        if not isinstance(name, str):
+            raise InputError(f"category or type is {brief(name)}; expected a name, such as 'mug'")
+        if (CATALOGUE[name].object_type if name in CATALOGUE else name) in _OF_FURNITURE:
+            raise InputError(
+                f"{name}: furniture has handles and joints; ArticulatedEstimator.load() of manipose_mj.ppf_jax finds "
+                "them, `manipose pose evaluate-articulated` says how well"
+            )
         if name not in CATALOGUE and name not in OBJECT_TYPES:
-            raise unknown_name("category or type", name, [*OBJECT_TYPES, *CATALOGUE])
+            rigid = [each for each in OBJECT_TYPES if each not in _OF_FURNITURE]
+            raise unknown_name("category or type", name, [*rigid, *CATALOGUE])
         stems = [name, CATALOGUE[name].object_type] if name in CATALOGUE else [name]
         folder = Path(str(resources.files("manipose_mj.ppf_jax"))) / "weights"
         calibration = calibration_in(folder)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,9 +13,11 @@ import jax
 import numpy as np
 import pytest
 
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.ppf_jax import estimator as module
+from manipose_mj.ppf_jax.articulated_estimator import ArticulatedEstimator
 from manipose_mj.ppf_jax.estimator import PoseEstimator, bucket
 from manipose_mj.ppf_jax.points.cloud_input import Cloud
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
@@ -225,8 +229,30 @@ def test_names_without_weights(monkeypatch, tmp_path):
         PoseEstimator.load("mug")
     with pytest.raises(InputError, match="unknown number of cameras 'multi'"):
         PoseEstimator.load("mug", cameras="multi")
-    with pytest.raises(InputError, match="cabinet: furniture has handles and joints"):
-        PoseEstimator.load("cabinet")
+
+
+@pytest.mark.parametrize("name", ["cabinet", "articulated", "handle"])
+def test_furniture_is_another_estimators(name, capsys):
+    """The advice names what there is: a class of this package, and a command."""
+    with pytest.raises(InputError, match=f"{name}: furniture has handles and joints") as caught:
+        PoseEstimator.load(name)
+    words = re.search(r"(\w+)\.load\(\) of (\S+) finds", str(caught.value))
+    assert words is not None
+    assert getattr(importlib.import_module(words[2]), words[1]) is ArticulatedEstimator
+    command = re.search(r"`manipose (.+)`", str(caught.value))
+    assert command is not None
+    with pytest.raises(SystemExit) as ended:
+        main([*command[1].split(), "--help"])
+    assert ended.value.code == 0 and "handles and joints" in capsys.readouterr().out
+    assert main(["pose", "evaluate", name, "--views", "1", "--jobs", "1"]) == 2
+    assert str(caught.value) in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+@pytest.mark.parametrize("name", [["mug"], None, 3])
+def test_what_is_no_name_is_one_line(name):
+    with pytest.raises(InputError, match="category or type is .*; expected a name"):
+        PoseEstimator.load(name)
 
 
 def test_weights_of_furniture_are_another_estimators():
