@@ -88,12 +88,14 @@ def cloud_arrays(
     """The points of a cloud as they are, and the normals of one that has any.
 
     Raises:
-      InputError: They are no numbers, three a row, or not as many normals as points.
+      InputError: They are no numbers, three a row, some are masked, or there are not as many normals as points.
     """
     oriented = not isinstance(cloud, np.ndarray) and hasattr(cloud, "points")
     points: np.ndarray
+    given: Any = cloud.points if oriented else cloud  # pyright: ignore[reportAttributeAccessIssue]
+    _check_unmasked("points", given)
     try:
-        points = np.asarray(cloud.points if oriented else cloud)  # pyright: ignore[reportAttributeAccessIssue]
+        points = np.asarray(given)
     except ValueError:  # rows of several lengths
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
@@ -104,6 +106,7 @@ def cloud_arrays(
     told = getattr(cloud, "normals", None) if oriented else None
     if told is None:
         return points, None
+    _check_unmasked("normals", told)
     try:
         normals = np.asarray(told)
     except ValueError:
@@ -113,6 +116,13 @@ def cloud_arrays(
     if normals.dtype.kind not in "fiu":
         raise InputError(f"normals of type {normals.dtype}; expected numbers")
     return points, normals
+
+
+def _check_unmasked(name: str, rows: Any) -> None:
+    if np.ma.is_masked(rows):  # which plain arrays forget
+        masked = np.atleast_1d(np.ma.getmaskarray(rows))
+        bad = int(masked.reshape(len(masked), -1).any(axis=1).sum())
+        raise InputError(f"{bad} of {len(masked)} {name} are masked; leave them out")
 
 
 def distinct_rows(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:

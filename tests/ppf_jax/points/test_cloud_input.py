@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from manipose_mj.errors import InputError
 from manipose_mj.ppf_jax.points.cloud_input import Cloud, checked_cloud, distinct_rows
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 
@@ -40,6 +41,23 @@ def test_rows_of_zeros_are_padding_and_one_is_a_point(plane):
     assert distinct_rows(np.concatenate([one, plane])).all()
     padded = np.concatenate([many, plane, many])
     np.testing.assert_array_equal(plane, padded[distinct_rows(padded)])
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_masked_rows_are_refused(plane):
+    """A depth picture's invalid pixels, say: a plain array would have them again."""
+    masked = np.ma.masked_array(plane, np.zeros(plane.shape, bool))
+    points, _ = checked_cloud(masked, **LIMITS)
+    np.testing.assert_array_equal(points, plane)
+    masked[3:5] = np.ma.masked
+    masked[9, 2] = np.ma.masked
+    for name, cloud in (
+        ("points", masked),
+        ("points", Cloud(masked, plane)),
+        ("normals", Cloud(plane, masked)),
+    ):
+        with pytest.raises(InputError, match=f"3 of 200 {name} are masked; leave them out"):
+            checked_cloud(cloud, **LIMITS)
 
 
 def test_normals_that_are_zero_are_estimated_and_others_stay(plane):
