@@ -68,8 +68,9 @@ def train_articulated(
     for name, count in (("further", further), ("synthetic", synthetic)):
         if count < 0:
             raise InputError(f"--{name} is {count}; expected 0 or more")
-    if seed < 0:
-        raise InputError(f"--seed is {seed}; expected 0 or more")
+    from manipose_mj.tasks.core.config import check_seed
+
+    check_seed(seed, "--seed")
     import jax
 
     from manipose_mj.console import output

@@ -81,8 +81,9 @@ def train_pose(
     for option, count in (("part-swaps", part_swaps), ("asset-part-swaps", asset_part_swaps)):
         if count < 0:
             raise InputError(f"--{option} is {count}; expected 0 or more")
-    if seed < 0:
-        raise InputError(f"--seed is {seed}; expected 0 or more")
+    from manipose_mj.tasks.core.config import check_seed
+
+    check_seed(seed, "--seed")
     if not setting:
         raise InputError("--setting names none; expected at least one, such as training")
     from manipose_mj.cli.pose.clouds import PoseClouds
