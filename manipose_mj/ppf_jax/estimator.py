@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -24,7 +24,7 @@ from manipose_mj.ppf_jax.confidence import (
     near,
     scores_of,
 )
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, seeds_of
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, checked_cloud, listed_clouds, seeds_of
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
 from manipose_mj.ppf_jax.points.clouds import MAX_POINTS, SAMPLE_POINTS
 from manipose_mj.ppf_jax.points.outlier_removal import not_alone
@@ -152,7 +152,7 @@ class PoseEstimator:
         sample = prepared_sample(model, cloud, key=key)
         return self.as_estimate(_estimate_sample(model, *sample, key=key))
 
-    def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
+    def estimate_many(self, clouds: Iterable[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """The poses of many objects at once, padded to the size that the largest needs.
 
         One compilation for every size and number of clouds.
@@ -160,7 +160,8 @@ class PoseEstimator:
         Raises:
           InputError: One of the clouds cannot be used.
         """
-        if len(clouds) == 0:
+        clouds = listed_clouds(clouds)
+        if not clouds:
             return []
         seeds_of(key)
         checked = []

@@ -6,7 +6,7 @@ such clouds, each point with the place of the camera that saw it. `MultiViewEsti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import jax
@@ -30,6 +30,7 @@ from manipose_mj.ppf_jax.points.cloud_input import (
     checked_cloud,
     cloud_arrays,
     distinct_rows,
+    listed_clouds,
     seeds_of,
 )
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
@@ -87,7 +88,7 @@ class FusedViewEstimator:
 
     def estimate_views(
         self,
-        clouds: Sequence[AnyCloud],
+        clouds: Iterable[AnyCloud],
         T_common_camera: Float[np.ndarray, "v 4 4"],
         *,
         key: PRNGKeyArray,
@@ -110,10 +111,11 @@ class FusedViewEstimator:
         return replace(_moved(found, T_common_camera), hypotheses=others)
 
     def estimate_many(
-        self, clouds: Sequence[FusedCloud | LabelledCloud], *, key: PRNGKeyArray
+        self, clouds: Iterable[FusedCloud | LabelledCloud], *, key: PRNGKeyArray
     ) -> list[PoseEstimate]:
         """`estimate_fused` of each; errors as there."""
         seeds_of(key)
+        clouds = listed_clouds(clouds)
         keys = jax.random.split(key, len(clouds)) if clouds else ()
         return [
             self.estimate_fused(cloud, key=own) for cloud, own in zip(clouds, keys, strict=True)
@@ -154,7 +156,7 @@ class FusedViewEstimator:
 
 
 def fused_cloud(
-    clouds: Sequence[AnyCloud],
+    clouds: Iterable[AnyCloud],
     T_common_camera: Float[np.ndarray, "v 4 4"],
     *,
     rng: np.random.Generator,
@@ -169,6 +171,7 @@ def fused_cloud(
     Returns:
       The cloud, and its frame in the common one.
     """
+    clouds = listed_clouds(clouds)
     frames = checked_frames(T_common_camera, len(clouds))
     seen = []
     for number, (cloud, frame) in enumerate(zip(clouds, frames, strict=True)):

@@ -7,7 +7,7 @@ from its flip another one may.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import jax
@@ -20,7 +20,7 @@ from manipose_mj.poses import invert
 from manipose_mj.ppf_jax.confidence import Scores, alike, scores_of
 from manipose_mj.ppf_jax.estimator import PoseEstimator, distinct_first, prepared_sample
 from manipose_mj.ppf_jax.points.camera_frames import checked_frames
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, seeds_of
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, listed_clouds, seeds_of
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
 from manipose_mj.ppf_jax.rigid.evidence import Evidence
 from manipose_mj.ppf_jax.rigid.model import PoseModel, estimate_with_evidence, score_poses
@@ -74,7 +74,7 @@ class MultiViewEstimator:
 
     def estimate_views(
         self,
-        clouds: Sequence[AnyCloud],
+        clouds: Iterable[AnyCloud],
         T_common_camera: Float[np.ndarray, "v 4 4"],
         *,
         key: PRNGKeyArray,
@@ -103,7 +103,7 @@ class MultiViewEstimator:
 
 def score_together(
     estimator: PoseEstimator,
-    clouds: Sequence[AnyCloud],
+    clouds: Iterable[AnyCloud],
     T_common_camera: Float[np.ndarray, "v 4 4"],
     *,
     key: PRNGKeyArray,
@@ -112,6 +112,7 @@ def score_together(
     model = estimator.trained.model
     if not isinstance(model, PoseModel):
         raise InputError("views are scored together by our networks only; estimate each by itself")
+    clouds = listed_clouds(clouds)
     frames = checked_frames(T_common_camera, len(clouds))
     seeds_of(key)
     poses, extents, penalty, leads, seen = [], [], [], [], []

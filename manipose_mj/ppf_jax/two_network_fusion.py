@@ -6,7 +6,7 @@ network of mirror-symmetric types finds the sides of flat objects, but has never
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from jaxtyping import PRNGKeyArray
 from manipose_mj.assets.categories import CATALOGUE
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.ppf_jax.estimator import PoseEstimate, PoseEstimator, distinct_first
-from manipose_mj.ppf_jax.points.cloud_input import AnyCloud
+from manipose_mj.ppf_jax.points.cloud_input import AnyCloud, listed_clouds
 from manipose_mj.ppf_jax.points.symmetry import CommonSymmetry
 
 AGREED = np.deg2rad(25.0)  # between the axes that the two networks name
@@ -53,8 +53,9 @@ class TwoNetworkFusion:
         """As `PoseEstimator.estimate`."""
         return agreed(self.upright.estimate(cloud, key=key), self.sides.estimate(cloud, key=key))
 
-    def estimate_many(self, clouds: Sequence[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
+    def estimate_many(self, clouds: Iterable[AnyCloud], *, key: PRNGKeyArray) -> list[PoseEstimate]:
         """As `PoseEstimator.estimate_many`."""
+        clouds = listed_clouds(clouds)
         ways = self.upright.estimate_many(clouds, key=key)
         frames = self.sides.estimate_many(clouds, key=key)
         return [agreed(*pair) for pair in zip(ways, frames, strict=True)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import jax
 import numpy as np
@@ -32,6 +33,7 @@ class Cloud:
     normals: Float[np.ndarray, "n 3"]
 
 
+T = TypeVar("T")
 AnyCloud: TypeAlias = OrientedCloud | Float[np.ndarray, "n 3"]
 
 
@@ -80,6 +82,20 @@ def checked_cloud(
         )
     points = points.astype(np.float32)
     return points, None if normals is None else _known(points, normals)
+
+
+def listed_clouds(clouds: Iterable[T]) -> tuple[T, ...]:
+    """Several clouds, as often as they are needed: a generator has them once.
+
+    Raises:
+      InputError: They are none, but a single cloud or nothing.
+    """
+    try:
+        return tuple(clouds)
+    except TypeError:
+        raise InputError(
+            f"clouds are of type {type(clouds).__name__}; expected a list of clouds"
+        ) from None
 
 
 def cloud_arrays(

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
 from manipose_mj.errors import InputError
+from manipose_mj.ppf_jax.estimator import PoseEstimator
+from manipose_mj.ppf_jax.fused_views import FusedViewEstimator
+from manipose_mj.ppf_jax.multi_view import MultiViewEstimator
 from manipose_mj.ppf_jax.points.cloud_input import Cloud, checked_cloud, distinct_rows
 from manipose_mj.ppf_jax.points.cloud_normals import cloud_normals
+from manipose_mj.ppf_jax.two_network_fusion import TwoNetworkFusion
 
 LIMITS = {"fewest": 32, "shortest": 1e-3, "longest": 5.0, "what": "an object"}
 
@@ -58,6 +63,26 @@ def test_masked_rows_are_refused(plane):
     ):
         with pytest.raises(InputError, match=f"3 of 200 {name} are masked; leave them out"):
             checked_cloud(cloud, **LIMITS)
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+def test_many_clouds_are_anything_that_gives_them(plane):
+    single = PoseEstimator.load("cup")
+    frames, key, few = np.stack([np.eye(4)] * 2), jax.random.key(0), plane[:9]
+    for ask in (
+        lambda clouds: MultiViewEstimator(single).estimate_views(clouds, frames, key=key),
+        lambda clouds: FusedViewEstimator(single).estimate_views(clouds, frames, key=key),
+        lambda clouds: FusedViewEstimator(single).estimate_many(clouds, key=key),
+        lambda clouds: single.estimate_many(clouds, key=key),
+        lambda clouds: TwoNetworkFusion(single, single).estimate_many(clouds, key=key),
+    ):
+        # All are read, and the clouds themselves are what is wrong.
+        with pytest.raises(InputError, match="9 points|18 points|learnt from one camera"):
+            ask(each for each in (few, few))
+        for none in (None, Cloud(plane, plane), 3):
+            with pytest.raises(InputError, match="clouds are of type .*; expected a list"):
+                ask(none)
+    assert single.estimate_many(iter(()), key=key) == []
 
 
 def test_normals_that_are_zero_are_estimated_and_others_stay(plane):
