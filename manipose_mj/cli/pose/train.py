@@ -211,8 +211,8 @@ def check_sizes(path: Path | None, initial: Any, config: Any, build: Callable[..
         with_weights_of(build(config, rng=np.random.default_rng(0)), initial)
     except InputError:
         raise InputError(
-            f"{path}: weights of networks of other sizes; expected those of a training of the same: a category's, "
-            "a type's or furniture's, by this version"
+            f"{path}: weights of networks of other sizes; expected those of a category where one is trained, of a "
+            "type or of furniture where that is, by this version"
         ) from None
 
 
