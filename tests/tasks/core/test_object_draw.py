@@ -91,11 +91,15 @@ def test_what_was_refused_before_changes_no_draw():
 def test_a_goal_is_of_the_object_that_is_asked_for():
     goals = (PoseGoal("a", np.eye(4)), PoseGoal("b", np.eye(4)))
     lifted = compose(np.eye(3), np.array([0.0, 0.0, 0.3]))
-    start = EpisodeStart(goals=goals, objects={})
+    markers = {"goal_a": np.eye(4), "goal_b": np.eye(4), "shelf": np.eye(4)}
+    start = EpisodeStart(goals=goals, objects={}, fixtures=markers)
     for names, moved in (((), 0), (("b",), 1)):
-        found = with_goal(start, lifted, names).goals
-        heights = [float(np.asarray(goal.pose)[2, 3]) for goal in found]
+        found = with_goal(start, lifted, names)
+        heights = [float(np.asarray(goal.pose)[2, 3]) for goal in found.goals]
         assert heights[moved] == 0.3 and sum(heights) == 0.3
+        assert [pose[2, 3] for pose in found.fixtures.values()] == [*heights, 0.0]
+    only = replace(start, goals=goals[:1], fixtures={"goal": np.eye(4)})
+    assert with_goal(only, lifted).fixtures["goal"][2, 3] == 0.3
 
 
 def test_a_refusal_is_one_line_with_a_short_traceback_and_every_object_is_looked_at_once():
