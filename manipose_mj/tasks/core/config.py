@@ -14,8 +14,8 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.tasks.core.object_selection import is_folder, select_assets
-from manipose_mj.tasks.core.own_goal import check_pose
 from manipose_mj.tasks.core.randomisation import STRENGTHS
+from manipose_mj.tasks.core.start_check import check_pose
 from manipose_mj.tasks.goals import RewardMode, Tolerance
 from manipose_mj.tasks.observations.sensor_config import SensorConfig
 from manipose_mj.tasks.observations.sensors import parse_modes
@@ -168,7 +168,7 @@ class EpisodeSpec:
                 pose = np.asarray(self.goal, float)
             except (TypeError, ValueError):
                 raise InputError("goal is no array of numbers; expected a pose, 4 x 4") from None
-            check_pose(pose)
+            check_pose(pose, "goal")
             object.__setattr__(self, "goal", tuple(map(tuple, pose.tolist())))
 
 

@@ -11,9 +11,8 @@ from jaxtyping import Float
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose
 from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start_check import check_pose
 from manipose_mj.tasks.goals import OrientationGoal, PoseGoal
-
-_ORTHONORMAL = 1e-4
 
 
 def with_goal(
@@ -29,7 +28,7 @@ def with_goal(
     Raises:
       InputError: The task asks for no pose, or this is none.
     """
-    check_pose(pose)
+    check_pose(pose, "goal")
     goals, fixtures = list(start.goals), dict(start.fixtures)
     for index, goal in enumerate(goals):
         if of and getattr(goal, "object", None) not in of:
@@ -56,15 +55,3 @@ def _move_marker(
     if marker in fixtures:
         place = fixtures[marker] if turned_only else pose
         fixtures[marker] = compose(pose[:3, :3], place[:3, 3])
-
-
-def check_pose(pose: np.ndarray) -> None:
-    """Raise `InputError` where an array is no rigid transform."""
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise InputError(
-            f"goal has shape {pose.shape}; expected a finite (4, 4) pose T_world_label"
-        )
-    rotation = pose[:3, :3]
-    skew = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    if skew > _ORTHONORMAL or np.linalg.det(rotation) < 0 or np.any(pose[3] != (0, 0, 0, 1)):
-        raise InputError("goal is no rigid transform: its rotation is not orthonormal")

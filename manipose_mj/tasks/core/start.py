@@ -100,34 +100,3 @@ class EpisodeStart:
     mount: Mount = Mount()
     model: ModelChanges = ModelChanges()
     noise_seed: int = 0
-
-
-def check_start(start: EpisodeStart, objects: int, furniture: int) -> None:
-    """Raise `InputError` for a start that cannot be written into a scene.
-
-    Args:
-      start: As a task drew it.
-      objects: Rigid objects of the scene.
-      furniture: Its articulated objects.
-    """
-    if not start.goals:
-        raise InputError("the start has no goal; expected at least one")
-    for number, goal in enumerate(start.goals):
-        name = getattr(goal, "object", None)
-        if name is not None and name not in start.objects:
-            raise InputError(
-                f"goal {number} of the start is about {name!r}; its objects are {', '.join(start.objects) or 'none'}"
-            )
-    for name, placed in start.objects.items():
-        _check_index(f"object {name!r}", placed.index, objects)
-        if np.shape(placed.pose) != (4, 4) or not np.isfinite(placed.pose).all():
-            raise InputError(f"the pose of object {name!r} is no finite 4 x 4 matrix")
-    for placed in start.furniture:
-        _check_index("furniture", placed.index, furniture)
-        if not np.isfinite([*placed.position, *placed.quaternion]).all():
-            raise InputError(f"the pose of furniture {placed.index} is not finite")
-
-
-def _check_index(what: str, index: int, count: int) -> None:
-    if not 0 <= index < count:
-        raise InputError(f"{what} has index {index}; the scene has {count} of its kind")

@@ -24,7 +24,8 @@ from manipose_mj.tasks.core.own_goal import with_goal
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.randomisation import Delay, Randomiser, randomisation, write_changes
 from manipose_mj.tasks.core.scene import Scene
-from manipose_mj.tasks.core.start import EpisodeStart, check_start
+from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start_check import check_start
 from manipose_mj.tasks.goals import Goal, PoseGoal, reward, success
 from manipose_mj.tasks.observations.frames import BodyFrame
 from manipose_mj.tasks.observations.sensors import SensorObservables, Slots
@@ -208,7 +209,12 @@ class ManipulationTask(composer.Task):
         changes = replace(changes, latency=changes.latency + self.env_config.latency)
         self._preview.change(changes)
         start = self.sample(rng, spec, self._preview)
-        check_start(start, len(self.scene.rigid_objects), len(self.scene.articulated_objects))
+        check_start(
+            start,
+            len(self.scene.rigid_objects),
+            [[part.name for part in e.asset.parts] for e in self.scene.articulated_objects],
+            self.scene.fixtures,
+        )
         if spec.goal is not None:
             asked = [
                 name
