@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from manipose_mj.errors import InputError, brief
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.registry import DrawnTaskFactory, TaskFactory, TaskSpec
 from manipose_mj.tasks.core.scene_objects import SceneObjects, Strata
@@ -40,8 +41,19 @@ class SceneSource:
         """The task with these objects in its scene, not compiled yet.
 
         Raises:
-          InputError: The task cannot use them.
+          InputError: The task cannot use them, or the factory makes no task.
         """
         if objects is None:
-            return cast(TaskFactory, self._spec.factory)(self._config)
-        return cast(DrawnTaskFactory, self._spec.factory)(self._config, objects)
+            task = cast(TaskFactory, self._spec.factory)(self._config)
+        else:
+            task = cast(DrawnTaskFactory, self._spec.factory)(self._config, objects)
+        if not isinstance(task, ManipulationTask):
+            raise InputError(
+                f"the factory of {self._spec.full_name} returned {brief(task)}; expected a ManipulationTask"
+            )
+        if not hasattr(task, "scene"):
+            raise InputError(
+                f"the task {self._spec.full_name} has no scene; "
+                f"expected super().__init__(config, env_config) in {type(task).__name__}.__init__"
+            )
+        return task

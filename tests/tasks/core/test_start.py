@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig
+from manipose_mj.tasks.core.registry import TaskSpec
+from manipose_mj.tasks.core.scene_source import SceneSource
 from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject
 from manipose_mj.tasks.core.start_check import check_start
+from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import InsideGoal, OpenGoal, OrientationGoal, PoseGoal
 
 GOALS = (PoseGoal("object", np.eye(4)),)
@@ -81,3 +85,26 @@ def test_what_does_not_fit_is_one_line(start, said):
     with pytest.raises(InputError, match=said) as caught:
         check_start(start, 1, PARTS, ("goal",))
     assert "\n" not in str(caught.value)
+
+
+class _Bare(ManipulationTask):
+    """Whose constructor forgets the one of its base."""
+
+    def __init__(self):
+        pass
+
+    def sample(self, rng, spec, preview):
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda env_config: 5, "factory of own/task returned 5; expected a ManipulationTask"),
+        (lambda env_config: _Bare(), r"own/task has no scene; expected super.* in _Bare.__init__"),
+    ],
+)
+def test_a_factory_that_makes_no_task_is_one_line(made, said):
+    scenes = SceneSource(TaskSpec("own", "task", made, (), "Own."), EnvConfig("own/task"))
+    with pytest.raises(InputError, match=said):
+        scenes.build(None)
