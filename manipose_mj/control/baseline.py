@@ -186,7 +186,7 @@ class Baseline:
                     )
                     candidate = _after(candidates, progress.failures_here)
                 else:
-                    candidate = next(candidates)
+                    candidate = _after(candidates, 0)
                 plan = candidate.steps()
                 check_plan(plan, estimate)
             except RecordError:
@@ -363,8 +363,15 @@ def _share_open(part: PartEstimate) -> float:
 
 
 def _after(candidates: Iterator[CandidatePlan], failed: int) -> CandidatePlan:
-    """The candidate after those that failed; where there are no more, the last of them."""
-    return deque(islice(candidates, failed + 1), maxlen=1).pop()
+    """The candidate after those that failed; where there are no more, the last of them.
+
+    Raises:
+      InputError: There is none at all.
+    """
+    found = deque(islice(candidates, failed + 1), maxlen=1)
+    if not found:
+        raise InputError("the planner has no plan left")
+    return found.pop()
 
 
 def _destination(plan: Plan, index: int) -> Step | None:

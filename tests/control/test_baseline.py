@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from manipose_mj.control.execution.executor import Executor
 from manipose_mj.control.execution.lifting import retraction_of
 from manipose_mj.control.execution.primitives import Primitives
 from manipose_mj.control.motion.motion_planner import MotionPlanner
+from manipose_mj.control.planning.planner import RulePlanner
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation import episode
 from manipose_mj.evaluation.records import EpisodeResult, Trajectory
@@ -220,3 +222,30 @@ def test_names_that_do_not_exist_are_refused(arguments, message):
     spec, pose = arguments.pop("spec", EpisodeSpec(0)), arguments.pop("pose", "oracle")
     with pytest.raises(InputError, match=message):
         episode.run_episode(EnvConfig(**{"task": TARGET_POSE, **arguments}), spec, pose=pose)
+
+
+class _FewPlans(RulePlanner):
+    """Has only the first plans that rules make, one move at a time."""
+
+    def __init__(self, count):
+        self.count = count
+
+    def step_by_step(self, goals, estimate):
+        return True
+
+    def candidates(self, goals, estimate, planner, tolerance):
+        return islice(super().candidates(goals, estimate, planner, tolerance), self.count)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_planner_without_another_plan_is_a_failure_of_planning(count, monkeypatch):
+    def blocked(self, *arguments, **more):
+        raise StageFailure("motion", "blocked")
+        yield
+
+    environment = load(*TARGET_POSE.split("/"), seed=0, obs_mode="state")
+    environment.reset()
+    monkeypatch.setattr(Baseline, "_carry_out", blocked)
+    with pytest.raises(StageFailure, match="no plan left") as caught:
+        next(Baseline(environment, planner=_FewPlans(count)).actions(0))
+    assert caught.value.stage == "plan"

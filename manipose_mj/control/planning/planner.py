@@ -144,7 +144,9 @@ def make_plan(
     tolerance: Tolerance = USUAL_TOLERANCE,
 ) -> Plan:
     """The most promising plan; arguments and errors as for `candidate_plans`."""
-    return next(candidate_plans(goals, estimate, planner, tolerance)).steps()
+    for candidate in candidate_plans(goals, estimate, planner, tolerance):
+        return candidate.steps()
+    raise InputError("the task's goals have no plan")
 
 
 def _plans_of_each(
@@ -170,7 +172,9 @@ def _plans_of_each(
 
 def _joined(plans_of_each: Sequence[Iterator[Plan]]) -> Iterator[Plan]:
     """All first plans joined, then all second ones; what has no more goes on with its last."""
-    plans: list[Plan | None] = [next(plans) for plans in plans_of_each]
+    plans = [next(more, None) for more in plans_of_each]
+    if None in plans:
+        raise InputError(f"goal {plans.index(None)} of the task has no plan")
     last = [plan or () for plan in plans]
     yield sum(last, ())
     while any(plan is not None for plan in plans):

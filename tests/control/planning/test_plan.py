@@ -12,6 +12,7 @@ import pytest
 from manipose_mj.assets.asset import Cavity, GraspSet
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
+from manipose_mj.control.planning import planner
 from manipose_mj.control.planning.cavity_places import poses_in_cavity
 from manipose_mj.control.planning.plan import Step, plan_from_json, plan_schema, plan_to_json
 from manipose_mj.control.planning.planner import make_plan
@@ -189,6 +190,15 @@ def test_a_goal_of_a_kind_without_plans_is_refused():
         make_plan((TiltedGoal(),), _estimate())
     kept = (PoseGoal("object", POSE), OnTableGoal("object"))
     assert make_plan(kept, _estimate()) == make_plan(kept[:1], _estimate())
+
+
+def test_a_goal_that_no_plan_reaches_is_told_by_its_number(monkeypatch):
+    monkeypatch.setattr(planner, "part_goal_plans", lambda *arguments: iter(()))
+    with pytest.raises(InputError, match="goal 1 of the task has no plan"):
+        make_plan((PoseGoal("object", POSE), ShutGoal("drawer")), _estimate())
+    monkeypatch.setattr(planner, "candidate_plans", lambda *arguments: iter(()))
+    with pytest.raises(InputError, match="the task's goals have no plan"):
+        make_plan((PoseGoal("object", POSE),), _estimate())
 
 
 @pytest.mark.parametrize("extents", [(0.25, 0.075, 0.075), (0.10, 0.06, 0.08), (0.05, 0.05, 0.05)])
