@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import sys
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,6 +14,7 @@ from dm_control import suite as dm_suite
 
 import manipose_mj
 from manipose_mj import batch, suite
+from manipose_mj.assets import catalogue
 from manipose_mj.errors import InputError
 from manipose_mj.gym import env_id
 from manipose_mj.tasks.core.registry import task_spec
@@ -23,11 +25,15 @@ from tests.places import ROOT
 PAGE = ROOT / "docs" / "guides" / "own_tasks.md"
 
 
+def _blocks():
+    """Those of Python on the page."""
+    return re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
 @pytest.fixture
 def lift_mug(tmp_path):
     """The page's module, imported."""
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    (tmp_path / "lift_mug_example.py").write_text(code, encoding="utf-8")
+    (tmp_path / "lift_mug_example.py").write_text(_blocks()[0], encoding="utf-8")
     spec = importlib.util.spec_from_file_location(
         "lift_mug_example", tmp_path / "lift_mug_example.py"
     )
@@ -51,6 +57,46 @@ def test_every_front_door_knows_a_task_of_ones_own(lift_mug):
     for other in starts[1:]:
         assert other.keys() == starts[0].keys()
         assert all(np.array_equal(other[name], value) for name, value in starts[0].items())
+
+
+def _moving(**fields):
+    """A factory of the page's `Move`, with fields of its class in the place of others."""
+    names: dict[str, Any] = {"__name__": __name__}
+    lift, move = _blocks()
+    exec(lift.partition("@register_task")[0] + move, names)
+    task = type("Move", (names["Move"],), fields)
+
+    def moved(env_config):
+        """Move a mug."""
+        return task((catalogue.load("mug", 0),), env_config)
+
+    return moved
+
+
+def test_a_goal_pose_of_ones_own_is_observed():
+    with registered("moved", _moving()) as task:
+        observation = suite.load(*task, seed=0).reset().observation
+    asked = observation["pose/object"] + 0.0
+    asked[1, 3] += 0.2
+    np.testing.assert_allclose(observation["pose/goal"], asked, atol=5e-3)
+
+
+def test_a_goal_pose_that_is_not_observed_is_told_once(caplog):
+    with registered("moved", _moving(observed_goals=())) as task:
+        environment = suite.load(*task, seed=0)
+        for _ in range(2):
+            environment.reset()
+    (told,) = [r.getMessage() for r in caplog.records if "observed_goals" in r.getMessage()]
+    assert "goals ask for poses of object, and observed_goals is ()" in told
+
+
+@pytest.mark.parametrize("names", ["goal", ("target",), ("goal", "goal_object")])
+def test_goals_observed_by_other_names_are_one_line(names):
+    with (
+        registered("moved", _moving(observed_goals=names)) as task,
+        pytest.raises(InputError, match="observed_goals .* expected"),
+    ):
+        suite.load(*task, seed=0)
 
 
 @pytest.mark.full
@@ -103,7 +149,7 @@ def test_a_refused_task_is_registered_nowhere():
 
 def test_modules_that_the_environment_names_are_imported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    code = _blocks()[0]
     (tmp_path / "lift_mug_module.py").write_text(code, encoding="utf-8")
     monkeypatch.setenv("MANIPOSE_TASKS", "lift_mug_module, ")
     monkeypatch.setattr(sys, "path", list(sys.path))

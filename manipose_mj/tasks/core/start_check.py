@@ -20,6 +20,7 @@ def check_start(
     objects: int,
     furniture: Sequence[Collection[str]] = (),
     fixtures: Collection[str] = (),
+    observed: Collection[str] = ("object",),
 ) -> None:
     """Raise `InputError` for a start that cannot be written into a scene.
 
@@ -28,6 +29,7 @@ def check_start(
       objects: Number of the scene's rigid objects.
       furniture: Names of the parts of each of its articulated objects.
       fixtures: Names of its fixtures.
+      observed: The task's `observed_objects`.
     """
     if not isinstance(start, EpisodeStart):
         raise InputError(f"the start is {brief(start)}; expected an EpisodeStart from `sample`")
@@ -38,6 +40,11 @@ def check_start(
         if not isinstance(value, tuple | list):
             raise InputError(f"{what} of the start is {brief(value)}; expected a tuple")
     _check_objects(start.objects, objects)
+    for name in start.objects:
+        if name not in observed:
+            raise InputError(
+                f"object {name!r} of the start is not among the task's observed_objects: {', '.join(observed)}"
+            )
     parts = _check_furniture(start.furniture, furniture)
     for name, pose in start.fixtures.items():
         if name not in fixtures:

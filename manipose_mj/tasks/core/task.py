@@ -214,6 +214,7 @@ class ManipulationTask(composer.Task):
             len(self.scene.rigid_objects),
             [[part.name for part in e.asset.parts] for e in self.scene.articulated_objects],
             self.scene.fixtures,
+            self.observed_objects,
         )
         if spec.goal is not None:
             asked = [

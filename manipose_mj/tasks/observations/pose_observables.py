@@ -12,8 +12,11 @@ many of them count, `pose/axial/NAME` whether every turn about X belongs to the 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from dm_control import composer, mjcf
@@ -21,7 +24,7 @@ from dm_env import specs
 from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, brief
 from manipose_mj.mjcf.objects import ArticulatedObject
 from manipose_mj.poses import SymmetryGroup, compose, invert
 from manipose_mj.tasks.goals import GoalFrame
@@ -36,6 +39,8 @@ from manipose_mj.tasks.observations.frames import (
 from manipose_mj.tasks.observations.sensor_config import PoseNoise
 from manipose_mj.tasks.observations.step_cache import StepCache, step_number
 
+log = logging.getLogger(__name__)
+
 MAX_TURNS = 24  # members of a cube's group, the largest of our shapes that are not round
 
 
@@ -47,11 +52,26 @@ class Slots:
       objects: As in the task's `objects`.
       goals: `goal` if an episode asks for the pose of one object at most, else `goal_` and the object.
       furniture: All pieces that an episode may show.
+
+    Raises:
+      InputError: Objects or goals are no names, or a goal is named otherwise.
     """
 
     objects: tuple[str, ...]
     goals: tuple[str, ...]
     furniture: tuple[ArticulatedObject, ...]
+
+    def __post_init__(self) -> None:
+        names: Any
+        for what, names in (("observed_objects", self.objects), ("observed_goals", self.goals)):
+            if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
+                raise InputError(f"{what} is {brief(names)}; expected a tuple of names")
+        known = [f"goal_{name}" for name in self.objects]
+        for name in () if self.goals == ("goal",) else self.goals:
+            if name not in known:
+                raise InputError(
+                    f"observed_goals names {name!r}; expected 'goal' alone, or {', '.join(known) or 'none'}"
+                )
 
 
 class PoseObservables:
@@ -192,11 +212,12 @@ class PoseObservables:
         frames = furniture_frames(scene.articulated_objects)
         frames |= {name: object_frame(entity) for name, entity in objects.items()}
         frames |= scene.extra_frames
-        goals = goal_frames(scene.goals, objects)
-        if slots.goals != ("goal",):
-            goals = {f"goal_{name}": goal for name, goal in goals.items()}
-        elif goals:
-            goals = {"goal": next(iter(goals.values()))}
+        asked = goal_frames(scene.goals, objects)
+        goals = {f"goal_{name}": goal for name, goal in asked.items()}
+        if slots.goals == ("goal",):
+            goals = dict(zip(slots.goals, asked.values(), strict=False))
+        if sum(name in slots.goals for name in goals) < len(asked):
+            _warn_of_hidden(type(scene).__name__, tuple(asked), slots.goals)
         rows = [row for row, name in enumerate(self._names) if name in frames]
         present = [frames[self._names[row]] for row in rows]
         groups = {n: t.symmetry for n, t in frames.items() if t.symmetry is not None}
@@ -234,6 +255,17 @@ class PoseObservables:
         """The joint's position [m or rad]; 0 for a part that the episode does not have."""
         address = self.carriers(physics).openings.get(part)
         return 0.0 if address is None else float(physics.data.qpos[address])
+
+
+@cache
+def _warn_of_hidden(task: str, asked: tuple[str, ...], shown: tuple[str, ...]) -> None:
+    """Warn, once, of goal poses that a task asks for and no observation shows."""
+    log.warning(
+        "%s: goals ask for poses of %s, and observed_goals is %s: the others are not observed",
+        task,
+        ", ".join(asked),
+        shown,
+    )
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,7 @@ def test_what_fits_its_scene_is_a_start():
         (_start(objects=_object(np.zeros((4, 4)))), "object 'object' is no rigid"),
         (_start(objects=_object(None)), r"shape \(\); expected a pose"),
         (_start(objects=PLACED | {"other": PLACED["object"]}), "object 0 of the scene is twice"),
+        (_start(objects={"mug": PLACED["object"]}), "'mug' .* observed_objects: object, other"),
         (_start(objects=[PLACED["object"]]), "objects of the start .* a mapping"),
         (_start(objects={"object": np.eye(4)}), "expected a PlacedObject"),
         (_start((_with(GOALS[0], pose=np.full((4, 4), np.nan)),)), "pose of goal 0 .* finite"),
@@ -83,7 +84,7 @@ def test_what_fits_its_scene_is_a_start():
 )
 def test_what_does_not_fit_is_one_line(start, said):
     with pytest.raises(InputError, match=said) as caught:
-        check_start(start, 1, PARTS, ("goal",))
+        check_start(start, 1, PARTS, ("goal",), ("object", "other"))
     assert "\n" not in str(caught.value)
 
 
