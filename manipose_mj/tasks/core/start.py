@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +13,8 @@ from jaxtyping import Float
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.arena import TABLE_HEIGHT
 from manipose_mj.tasks.goals import Goal
+
+_Holder = TypeVar("_Holder")
 
 
 class NoStartError(InputError):
@@ -100,3 +104,29 @@ class EpisodeStart:
     mount: Mount = Mount()
     model: ModelChanges = ModelChanges()
     noise_seed: int = 0
+
+
+def read_only(start: EpisodeStart) -> EpisodeStart:
+    """The start with copies of its arrays that nobody can write to; changes of the model stay the arrays they are."""
+    return replace(
+        start,
+        goals=tuple(_read_only(goal) for goal in start.goals),
+        objects={name: _read_only(placed) for name, placed in start.objects.items()},
+        furniture=tuple(_read_only(placed) for placed in start.furniture),
+        fixtures={name: _copy(pose) for name, pose in start.fixtures.items()},
+    )
+
+
+def _read_only(holder: _Holder) -> _Holder:
+    """A copy of a goal or of something placed, with copies of its arrays."""
+    copied = copy.copy(holder)
+    for name, value in getattr(holder, "__dict__", {}).items():
+        if isinstance(value, np.ndarray):
+            object.__setattr__(copied, name, _copy(value))
+    return copied
+
+
+def _copy(array: np.ndarray) -> np.ndarray:
+    copied = np.array(array)
+    copied.setflags(write=False)
+    return copied

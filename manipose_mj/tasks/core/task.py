@@ -24,7 +24,7 @@ from manipose_mj.tasks.core.own_goal import with_goal
 from manipose_mj.tasks.core.preview import Preview
 from manipose_mj.tasks.core.randomisation import Delay, Randomiser, randomisation, write_changes
 from manipose_mj.tasks.core.scene import Scene
-from manipose_mj.tasks.core.start import EpisodeStart
+from manipose_mj.tasks.core.start import EpisodeStart, read_only
 from manipose_mj.tasks.core.start_check import check_start
 from manipose_mj.tasks.goals import Goal, PoseGoal, reward, success
 from manipose_mj.tasks.observations.frames import BodyFrame
@@ -224,7 +224,8 @@ class ManipulationTask(composer.Task):
             ]
             start = with_goal(start, np.array(spec.goal), asked)
         # The seed is drawn whatever the sensors: the next episode shall not depend on what is observed.
-        return replace(start, model=changes, noise_seed=int(rng.randint(2**31)))
+        seed = int(rng.randint(2**31))
+        return replace(read_only(start), model=changes, noise_seed=seed)
 
     def _check_asked(self, spec: EpisodeSpec) -> None:
         """Raise `InputError` where an episode is asked to be about what this task does not have."""

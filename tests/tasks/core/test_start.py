@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,11 @@ from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.registry import TaskSpec
 from manipose_mj.tasks.core.scene_source import SceneSource
-from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject
+from manipose_mj.tasks.core.start import EpisodeStart, PlacedFurniture, PlacedObject, read_only
 from manipose_mj.tasks.core.start_check import check_start
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.goals import InsideGoal, OpenGoal, OrientationGoal, PoseGoal
+from tests.few_objects import load
 
 GOALS = (PoseGoal("object", np.eye(4)),)
 PLACED = {"object": PlacedObject(0, np.eye(4))}
@@ -109,3 +111,31 @@ def test_a_factory_that_makes_no_task_is_one_line(made, said):
     scenes = SceneSource(TaskSpec("own", "task", made, (), "Own."), EnvConfig("own/task"))
     with pytest.raises(InputError, match=said):
         scenes.build(None)
+
+
+def test_nobody_writes_to_the_start_of_an_episode():
+    environment = load("single_object", "target_pose", seed=0, obs_mode="state")
+    environment.reset()
+    start = environment.task.start
+    goal, marker = start.goals[0].pose, start.fixtures["goal"]
+    assert not np.shares_memory(goal, marker)
+    for array in (goal, marker, start.objects["object"].pose):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 3] = 9.0
+    for other in (pickle.loads(pickle.dumps(start)), copy.deepcopy(start)):
+        np.testing.assert_array_equal(other.goals[0].pose, goal)
+
+
+def test_a_start_is_apart_from_the_arrays_it_was_drawn_with():
+    goal, pose, position = np.eye(4), np.eye(4), np.zeros(3)
+    piece = PlacedFurniture(0, position, np.eye(4)[0])
+    drawn = EpisodeStart(
+        (PoseGoal("object", goal), OpenGoal("drawer")), {"object": PlacedObject(0, pose)}, (piece,)
+    )
+    start = read_only(drawn)
+    for array in (goal, pose, position):
+        array += 1.0
+    np.testing.assert_array_equal(start.goals[0].pose, np.eye(4))
+    np.testing.assert_array_equal(start.objects["object"].pose, np.eye(4))
+    np.testing.assert_array_equal(start.furniture[0].position, np.zeros(3))
+    assert start.goals[1] == OpenGoal("drawer") and drawn.goals[0].pose.flags.writeable
