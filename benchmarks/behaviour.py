@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,8 +25,11 @@ import tyro
 
 from manipose_mj import suite
 from manipose_mj.control.perception.pose_sources import sensors_for
+from manipose_mj.errors import InputError, check_count
 from manipose_mj.evaluation.episode import run_episode
+from manipose_mj.storage.staging import staging
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
+from manipose_mj.tasks.core.registry import tasks_named
 
 OBSERVATIONS = "state+pose+rgb+depth+segmentation+pointcloud"
 CONTROL_MODES = (
@@ -44,6 +48,7 @@ CONTROL_MODES = (
 ESTIMATED = "single_object/target_pose"
 CATEGORIES = ("bowl", "mug")
 RANDOM_STEPS = 6
+_NAMED = 5  # entries that are in one file only
 
 
 def digest(array: object) -> str:
@@ -114,10 +119,16 @@ def record(
       out: JSON file.
       episodes: Of each task.
       jobs: Processes.
-      only: Tasks; all by default.
+      only: Tasks, or patterns of them such as `clutter/*`; all by default.
+
+    Raises:
+      InputError: The file cannot be written, a task is unknown, or a number is below 1.
     """
-    tasks = [f"{domain}/{name}" for domain, name in suite.ALL_TASKS]
-    tasks = [task for task in tasks if not only or task in only]
+    check_count("episodes", episodes, least=1)
+    check_count("jobs", jobs, least=1)
+    if out.is_dir() or not out.parent.is_dir():
+        raise InputError(f"{out}: cannot be written; expected a file in a folder that exists")
+    tasks = tasks_named(only or ("*",))
     calls: dict[str, Any] = {}
     for task in tasks:
         for episode in range(episodes):
@@ -132,14 +143,21 @@ def record(
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
         rows = joblib.Parallel(n_jobs=jobs, verbose=1)(calls.values())
     document = dict(zip(calls, rows, strict=True))
-    out.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    with staging(out) as scratch:
+        whole = scratch / out.name
+        whole.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        whole.replace(out)
 
 
 def compare(
     before: Annotated[Path, tyro.conf.Positional], after: Annotated[Path, tyro.conf.Positional]
 ) -> None:
-    """Print what differs; exit with 1 if anything does."""
-    old, new = (json.loads(path.read_text(encoding="utf-8")) for path in (before, after))
+    """Print what differs or is in one file only; exit with 1 if anything does.
+
+    Raises:
+      InputError: A file is no record.
+    """
+    old, new = _read(before), _read(after)
     shared = [key for key in old if key in new]
     differing = [key for key in shared if old[key] != new[key]]
     for key in differing:
@@ -150,8 +168,29 @@ def compare(
     print(
         f"{len(shared) - len(differing)} of {len(shared)} equal; in one file only: {len(missing)}"
     )
-    raise SystemExit(1 if differing or not shared else 0)
+    for key in missing[:_NAMED]:
+        print(f"only in {before if key in old else after}: {key}")
+    raise SystemExit(1 if differing or missing or not shared else 0)
+
+
+def _read(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {error}; expected a record") from None
+    if not isinstance(document, dict) or not all(isinstance(r, dict) for r in document.values()):
+        raise InputError(f"{path}: is no record of episodes")
+    return document
+
+
+def main() -> None:
+    """Record or compare; what cannot be used is one line, with exit code 2."""
+    try:
+        tyro.extras.subcommand_cli_from_dict({"record": record, "compare": compare})
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
 
 
 if __name__ == "__main__":
-    tyro.extras.subcommand_cli_from_dict({"record": record, "compare": compare})
+    main()
