@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
 
 def load(
     domain: str,
-    task: str,
+    task: str | None = None,
     seed: int | np.random.RandomState | None = None,
     *,
     environment_kwargs: dict[str, Any] | None = None,
@@ -55,9 +55,14 @@ def load(
         `randomisation`, `sensors`, `latency`.
 
     Raises:
-      InputError: An unknown task, observation or control mode, objects that the task cannot use, a number that is no
+      InputError: No domain and task, an unknown task, observation or control mode, objects that the task cannot use, a number that is no
         seed, or an argument that `composer.Environment` does not have or that `seed` stands for.
     """
+    if not isinstance(domain, str) or task is None:
+        raise InputError(
+            f'load got {brief(domain)} and {brief(task)}; expected load("single_object", "target_pose"), '
+            'or make(EnvConfig("single_object/target_pose"))'
+        )
     spec = task_spec(domain, task)
     return make(env_config(spec.full_name, config), seed, environment_kwargs=environment_kwargs)
 
@@ -68,7 +73,11 @@ def make(
     *,
     environment_kwargs: dict[str, Any] | None = None,
 ) -> composer.Environment:
-    """The environment that a configuration describes; arguments as for `load`."""
+    """The environment that a configuration describes; arguments and errors as for `load`."""
+    if not isinstance(config, EnvConfig):
+        raise InputError(
+            f"make got {brief(config)}; expected an EnvConfig, as EnvConfig('single_object/target_pose')"
+        )
     spec = named_task(config.task)
     _check_arguments({} if environment_kwargs is None else environment_kwargs)
     if seed is not None and not isinstance(seed, np.random.RandomState):
@@ -164,6 +173,8 @@ def _suite_factory(spec: TaskSpec) -> Any:
         environment_kwargs: dict[str, Any] | None = None,
         **task_kwargs: Any,
     ) -> dm_env.Environment:
+        if "seed" in task_kwargs:
+            raise InputError("task_kwargs has seed; give it as random")
         more = dict(environment_kwargs or {})
         if time_limit is not None:
             more["time_limit"] = time_limit

@@ -15,7 +15,7 @@ from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.batch.worlds import Worlds
 from manipose_mj.errors import InputError, check_count, how_to_install, unknown_name
-from manipose_mj.tasks.core.config import EnvOptions, check_seed, env_config
+from manipose_mj.tasks.core.config import EnvConfig, EnvOptions, check_seed, env_config
 
 ENGINES = ("auto", "c", "warp")
 EngineName = Literal["auto", "c", "warp"]
@@ -26,7 +26,7 @@ WARP_ON_CPU = (
 
 
 def make(
-    task: str,
+    task: str | EnvConfig,
     *,
     worlds: int,
     seed: int = 0,
@@ -40,7 +40,7 @@ def make(
     """Many worlds of a registered task.
 
     Args:
-      task: `"domain/name"`.
+      task: `"domain/name"`, or a configuration with all its options.
       worlds: How many.
       seed: The first of the seeds that the worlds' episodes have: `DEFAULT_STARTS` of them, or as many as there
         are worlds if these are fewer.
@@ -63,7 +63,10 @@ def make(
     elif not isinstance(seeds, Iterable) or isinstance(seeds, str):
         raise InputError(f"seeds is {seeds!r}; expected whole numbers, each once")
     chosen = available_engine(engine)
-    pool = draw_pool(env_config(task, config), list(seeds))
+    if isinstance(task, EnvConfig) and config:
+        raise InputError(f"{', '.join(config)} beside an EnvConfig; expected all options in it")
+    described = task if isinstance(task, EnvConfig) else env_config(task, config)
+    pool = draw_pool(described, list(seeds))
     return from_pool(pool, worlds, chosen, threads=threads, visual=visual, capacity=capacity)
 
 

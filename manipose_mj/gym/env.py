@@ -252,9 +252,6 @@ def _episode(seed: int | None, options: dict[str, Any]) -> EpisodeSpec:
     index = asked.pop("start_index", None)
     if index is not None:
         check_seed(index, "start_index")
-    for name in asked.keys() - {"goal"}:
-        if not isinstance(asked[name], str):
-            raise InputError(f"{name} is {asked[name]!r}; expected a name")
     return EpisodeSpec(seed if index is None else int(index), **asked)
 
 

@@ -16,7 +16,9 @@ from manipose_mj import batch
 from manipose_mj.batch.perception.cameras import Cameras
 from manipose_mj.batch.simulator import Simulator
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig
 from tests.batch.batched import make, wandering
+from tests.few_objects import few
 
 TASK = "articulated/open_middle_drawer"
 pytestmark = pytest.mark.usefixtures("wrong_arrays")
@@ -56,6 +58,16 @@ def test_what_is_no_key_is_refused(worlds, state, key, message):
     refused(lambda: worlds.reset(key), message)
     if key is not None:
         refused(lambda: worlds.rollout(lambda seen, own: None, state, 1, key=key), message)
+
+
+def test_a_configuration_has_all_options(worlds):
+    config = EnvConfig(TASK, obs_mode="state", objects=few(TASK))
+    made = batch.make(config, worlds=1, seeds=(7,), engine="c")
+    assert made.pool.layout == worlds.pool.layout
+    refused(
+        lambda: batch.make(config, worlds=1, engine="c", objects=["cabinet_000"]),
+        "objects beside an EnvConfig; expected all options in it",
+    )
 
 
 def test_both_kinds_of_keys_begin_alike(worlds):

@@ -12,7 +12,7 @@ import numpy as np
 from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, brief, unknown_name
 from manipose_mj.tasks.core.object_selection import is_folder, select_assets
 from manipose_mj.tasks.core.randomisation import STRENGTHS
 from manipose_mj.tasks.core.start_check import check_pose
@@ -23,6 +23,7 @@ from manipose_mj.tasks.observations.sensors import parse_modes
 REWARD_MODES: tuple[RewardMode, ...] = ("sparse", "dense")
 PRIMITIVE = "primitive"
 SEEDS = 2**32  # of episodes: those of `numpy.random.RandomState`
+_USUAL_SPLIT: Split = "train"
 Objects = Sequence[Asset | str | Path]
 
 
@@ -37,15 +38,16 @@ class EnvConfig:
         physics is the same for all.
       reward_mode: `"sparse"`, 1 while the goals are met; or `"dense"`, in [0, 1].
       objects: Objects to draw from instead of the built-in ones: assets, names of built-in objects, asset
-        folders, or folders of asset folders.
+        folders, or folders of asset folders. The name of a split stands for `split`, unless there is a folder of
+        that name; both are then as if `split` alone had been given.
       split: Which built-in objects to draw from; train and test objects have nothing in common.
       randomisation: Name of a strength of domain randomisation.
       sensors: Cameras, images, clouds and their noise.
       latency: By how much servo targets come late, beside what `randomisation` draws [s].
 
     Raises:
-      InputError: A mode, split or strength is unknown, and the nearest names are offered; or the latency is
-        negative.
+      InputError: A mode, split or strength is unknown, and the nearest names are offered; `objects` and `split` name
+        different splits; or the latency is negative.
     """
 
     task: str
@@ -53,16 +55,18 @@ class EnvConfig:
     control_mode: str = "pd_joint_pos"
     reward_mode: RewardMode = "sparse"
     objects: Objects | None = None
-    split: Split = "train"
+    split: Split = _USUAL_SPLIT
     randomisation: str = "none"
     sensors: SensorConfig = SensorConfig()
     latency: float = 0.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.latency, int | float | np.number) or not 0 <= self.latency < 10:
+        number = isinstance(self.latency, int | float | np.number)
+        if not number or isinstance(self.latency, bool) or not 0 <= self.latency < 10:
             raise InputError(f"latency is {self.latency!r} s; expected a number from 0 to 10")
         if not isinstance(self.sensors, SensorConfig):
             raise InputError(f"sensors is a {type(self.sensors).__name__}; expected a SensorConfig")
+        self._take_split()
         for what, value, known in (
             ("control mode", self.control_mode, (*CONTROL_MODES, PRIMITIVE)),
             ("reward mode", self.reward_mode, REWARD_MODES),
@@ -79,8 +83,18 @@ class EnvConfig:
                 raise InputError(f"objects is {chosen!r}; expected names, folders or assets")
             object.__setattr__(self, "objects", (chosen,) if one else tuple(chosen))
             for each in self.objects or ():
-                if not isinstance(each, str | Path | Asset):
+                if not isinstance(each, str | Path | Asset) or each == "":
                     raise InputError(f"objects: {each!r} is no name, folder or asset")
+
+    def _take_split(self) -> None:
+        """Let `objects` that name a split say which."""
+        chosen: Any = self.objects
+        if not isinstance(chosen, str) or chosen not in SPLITS or is_folder(chosen):
+            return
+        if self.split not in (_USUAL_SPLIT, chosen):
+            raise _two_splits(chosen, self.split)
+        object.__setattr__(self, "objects", None)
+        object.__setattr__(self, "split", chosen)
 
     def assets(self) -> tuple[Asset, ...] | None:
         """The objects chosen, loaded; None where the task shall use the built-in ones.
@@ -118,7 +132,7 @@ def env_config(task: str, options: EnvOptions) -> EnvConfig:
 
     Args:
       task: `"domain/name"`.
-      options: Fields of `EnvConfig`; `objects` may name a split instead, unless there is a folder of that name.
+      options: Fields of `EnvConfig`.
 
     Raises:
       InputError: The task is no name, a field is unknown or holds what it cannot, or `objects` and `split` name different
@@ -129,13 +143,14 @@ def env_config(task: str, options: EnvOptions) -> EnvConfig:
     for name in options:
         if name not in EnvOptions.__annotations__:
             raise unknown_name("option", name, EnvOptions.__annotations__)
-    chosen: Any = options.get("objects")
-    if isinstance(chosen, str) and chosen in SPLITS and not is_folder(chosen):
-        split = options.get("split", chosen)
-        if split != chosen:
-            raise InputError(f"objects is {chosen!r} and split is {split!r}; expected one of them")
-        options = {**options, "objects": None, "split": chosen}
-    return EnvConfig(task, **options)
+    config, split = EnvConfig(task, **options), options.get("split")
+    if split is not None and split != config.split:
+        raise _two_splits(config.split, split)
+    return config
+
+
+def _two_splits(objects: str, split: str) -> InputError:
+    return InputError(f"objects is {objects!r} and split is {split!r}; expected one of them")
 
 
 @dataclass(frozen=True)
@@ -151,7 +166,7 @@ class EpisodeSpec:
       goal: `T_world_label` that the object shall have in the end, `(4, 4)`, kept as rows; None draws it.
 
     Raises:
-      InputError: The seed is no whole number from 0 to 2**32 - 1, or the goal no pose.
+      InputError: The seed is no whole number from 0 to 2**32 - 1, a name no text, or the goal no pose.
     """
 
     seed: int | None = None
@@ -163,6 +178,10 @@ class EpisodeSpec:
     def __post_init__(self) -> None:
         if self.seed is not None:
             check_seed(self.seed)
+        for what in ("object", "furniture", "part"):
+            name = getattr(self, what)
+            if name is not None and not (isinstance(name, str) and name):
+                raise InputError(f"{what} is {brief(name)}; expected a name")
         if self.goal is not None:
             try:
                 pose = np.asarray(self.goal, float)

@@ -16,7 +16,7 @@ from dm_control import composer
 from dm_control.composer.environment import HOOK_NAMES
 from dm_control.rl.control import PhysicsError
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, brief
 from manipose_mj.tasks.core.config import EpisodeSpec
 from manipose_mj.tasks.core.scene_objects import SceneObjects
 from manipose_mj.tasks.core.scene_source import SceneSource
@@ -105,6 +105,10 @@ class TaskEnvironment(composer.Environment):
           PhysicsError: None of a few starts came to rest.
         """
         self._require_open()
+        if spec is not None and not isinstance(spec, EpisodeSpec):
+            raise InputError(
+                f"reset got {brief(spec)}; expected an EpisodeSpec, as EpisodeSpec(seed=0)"
+            )
         spec = spec or EpisodeSpec()
         self._reset_next_step = True  # where this fails, the next step begins an episode
         if spec.seed is not None:

@@ -15,7 +15,7 @@ from manipose_mj import suite
 from manipose_mj.assets import catalogue
 from manipose_mj.assets.categories import SPLITS
 from manipose_mj.errors import InputError
-from manipose_mj.tasks.core.config import EnvConfig, env_config
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec, env_config
 from manipose_mj.tasks.observations.sensors import CameraView, SensorConfig
 from tests.few_objects import few, load
 from tests.tasks.episode_driver import HOLD
@@ -124,6 +124,8 @@ def test_dm_control_knows_the_tasks_once_registered(monkeypatch):
     options = {"environment_kwargs": {"time_limit": 5.0}, "observations": "state"}
     assert asked == [(*task, 7, options) for task in suite.ALL_TASKS]
     assert dm_suite.load("cartpole", "balance").reset().first()
+    with pytest.raises(InputError, match="task_kwargs has seed; give it as random"):
+        dm_suite.load(*TARGET_POSE, task_kwargs={"seed": 1})
 
 
 @pytest.mark.parametrize("task", [TARGET_POSE, STORE], ids="/".join)
@@ -163,13 +165,43 @@ def test_a_closed_environment_says_so():
         ({"seed": "abc"}, "seed is 'abc'"),
         ({"latency": "0.1"}, "latency is '0.1' s"),
         ({"sensors": {"height": 3}}, "sensors is a dict; expected a SensorConfig"),
+        ({"latency": True}, "latency is True s"),
         ({"objects": [5]}, "objects: 5 is no name"),
+        ({"objects": ""}, "objects: '' is no name"),
     ],
 )
 def test_options_of_other_kinds_are_one_line(options, said):
     with pytest.raises(InputError, match=said) as caught:
         suite.load("single_object", "target_pose", **options)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("what", ["object", "furniture", "part"])
+@pytest.mark.parametrize("name", [5, ["a"], ""])
+def test_what_an_episode_is_about_is_a_name(what, name):
+    with pytest.raises(InputError, match=rf"{what} is .*; expected a name"):
+        EpisodeSpec(**{what: name})
+
+
+@pytest.mark.parametrize(
+    ("use", "said"),
+    [
+        (lambda: suite.load(EnvConfig("a/b")), r"load got EnvConfig\(.* expected load\(.* or make"),
+        (lambda: suite.load("/".join(TARGET_POSE)), r"load got 'single.* expected load\("),
+        (lambda: suite.make("/".join(TARGET_POSE)), "make got 'single.* expected an EnvConfig"),
+    ],
+)
+def test_a_front_door_says_what_it_takes(use, said):
+    with pytest.raises(InputError, match=said) as caught:
+        use()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_reset_takes_an_episode_alone():
+    environment = load(*TARGET_POSE, seed=0)
+    for spec in (0, 5, {"seed": 5}):
+        with pytest.raises(InputError, match="reset got .*; expected an EpisodeSpec"):
+            environment.reset(spec)
 
 
 def test_objects_may_name_a_split(tmp_path, monkeypatch):
@@ -179,6 +211,9 @@ def test_objects_may_name_a_split(tmp_path, monkeypatch):
         assert env_config(task, {"objects": split, "split": split}) == EnvConfig(task, split=split)
     with pytest.raises(InputError, match=r"objects is 'test' and split is 'train'; expected one"):
         env_config(task, {"objects": "test", "split": "train"})
+    assert EnvConfig(task, objects="test") == EnvConfig(task, split="test")
+    with pytest.raises(InputError, match=r"objects is 'train' and split is 'test'; expected one"):
+        EnvConfig(task, objects="train", split="test")
     (tmp_path / "test").mkdir()
     monkeypatch.chdir(tmp_path)
     assert env_config(task, {"objects": "test"}).objects == ("test",)
