@@ -165,7 +165,7 @@ class Baseline:
         scene, task = self._scene(), self._environment.task
         follows = self._planner.follows_goals
         scene.perception.reset(seed, for_goals=follows)
-        self._planner.begin(instruction(task))
+        self._planner.reset(instruction(task))
         timestep = task.control_timestep
         executor = Executor(scene.perception, timestep)
         primitives = Primitives(executor)

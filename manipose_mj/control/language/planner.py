@@ -79,7 +79,7 @@ class LanguagePlanner:
         self._episode, self._number = (task, episode), 0
         self._model.begin(task, episode)
 
-    def begin(self, instruction: str) -> None:
+    def reset(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
         self._asked_for = self._instruction or instruction
         self._left, self._done = (), []

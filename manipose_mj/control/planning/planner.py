@@ -37,7 +37,7 @@ class TaskPlanner(Protocol):
         """This episode of an evaluation comes next."""
         ...
 
-    def begin(self, instruction: str) -> None:
+    def reset(self, instruction: str) -> None:
         """An episode begins, which asks for this in words."""
         ...
 
@@ -82,7 +82,7 @@ class RulePlanner:
     def name_episode(self, task: str, episode: int) -> None:
         """Rules are the same in all."""
 
-    def begin(self, instruction: str) -> None:
+    def reset(self, instruction: str) -> None:
         """Goals say all that rules need."""
 
     def carried_out(self, step: Step) -> None:

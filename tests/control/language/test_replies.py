@@ -180,7 +180,7 @@ def test_exchanges_bear_the_name_of_their_episode(tmp_path):
     planner = LanguagePlanner(ReplayModel(tmp_path), record=tmp_path / "2.jsonl")
     for episode in (4, 5):
         planner.name_episode("a/b", episode)
-        planner.begin("a")
+        planner.reset("a")
         for _ in range(2):
             planner.steps(ASKED, {}, kitchen(), {})
     found = read_exchanges(tmp_path / "2.jsonl")

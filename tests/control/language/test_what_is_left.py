@@ -74,7 +74,7 @@ def words(plan: Plan) -> list[str]:
 def test_what_comes_after_a_look_is_the_rest_of_the_answer():
     model = Model(led(DRAWER, 0.19) + shut(DRAWER) + led(OTHER, 0.19))
     planner = LanguagePlanner(model, "Open the middle drawer, shut it, then open the top one.")
-    planner.begin("")
+    planner.reset("")
     for step in planned(planner)[:4]:
         planner.carried_out(step)
     assert words(planned(planner)) == [f"{each} {OTHER}" for each in ("grasp_at", "move_to", "release")]  # fmt: skip
@@ -84,7 +84,7 @@ def test_what_comes_after_a_look_is_the_rest_of_the_answer():
 def test_a_rest_that_is_wrong_by_now_is_asked_about_with_what_was_done():
     model = Model(led(DRAWER, 0.19) + put("mug", f"inside {DRAWER}"), put("blue_can", "table"))
     planner = LanguagePlanner(model, "Put the mug into the middle drawer.")
-    planner.begin("")
+    planner.reset("")
     for step in planned(planner)[:3]:
         planner.carried_out(step)
     # It did not open: nothing can be put into it.
@@ -102,14 +102,14 @@ def test_a_rest_that_is_wrong_by_now_is_asked_about_with_what_was_done():
 def test_a_failure_is_told_with_what_was_done_before_it():
     model = Model(put("mug", "table"), put("mug", "table"), put("mug", "table"))
     planner = LanguagePlanner(model)
-    planner.begin("Put the mug elsewhere.")
+    planner.reset("Put the mug elsewhere.")
     for step in planned(planner)[:2]:
         planner.carried_out(step)
     planner.failed("release mug: it slipped\nout")
     planned(planner)
     assert '- move_to mug, destination "table"\n' in model.questions[1]
     assert "- given up, with the hand emptied: release mug: it slipped out\n" in model.questions[1]
-    planner.begin("Put the mug elsewhere.")
+    planner.reset("Put the mug elsewhere.")
     planned(planner)
     assert "Done so far" not in model.questions[2]  # another episode
 
@@ -118,7 +118,7 @@ def test_places_on_the_table_are_free_though_a_drawer_stands_where_the_arm_waits
     motions = Mock(spec=MotionPlanner)
     motions.collides.side_effect = lambda joints, query: np.array_equal(joints, HOME)
     planner = LanguagePlanner(Model(put("mug", "table")))
-    planner.begin("Put the mug elsewhere.")
+    planner.reset("Put the mug elsewhere.")
     plan = next(planner.candidates((), kitchen(), motions, Tolerance())).steps()
     assert words(plan) == ["grasp_at mug", "move_to mug", "release mug"]
 
