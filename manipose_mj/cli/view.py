@@ -33,11 +33,14 @@ def view(
     import numpy as np
 
     from manipose_mj import suite
-    from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
+    from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING, picture_visuals
     from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 
     episode = EpisodeSpec(seed)
-    environment = suite.make(EnvConfig(task, obs_mode="state", objects=objects or None))
+    config = EnvConfig(
+        task, obs_mode="state", objects=objects or None, robot_visuals=picture_visuals()
+    )
+    environment = suite.make(config)
     environment.reset(episode)
     action = np.append(HOME, MAX_OPENING)
     shown: Any = None

@@ -28,6 +28,7 @@ from manipose_mj.evaluation.rollout import Outcome, Rollout, Rules
 from manipose_mj.failures import StageFailure
 from manipose_mj.gym.droid import droid_observation, from_droid
 from manipose_mj.gym.features import Features
+from manipose_mj.mjcf.panda.robot import picture_visuals
 from manipose_mj.policies.baseline import BaselinePolicy
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.policies.protocol import ActionSpace, Policy
@@ -300,8 +301,11 @@ class _Guarded:
 
 
 def start_state(config: EnvConfig, spec: EpisodeSpec) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The model and the state in which an episode starts; arguments as for an episode."""
-    environment = environment_of(config)
+    """The model and the state in which an episode starts, for pictures; arguments as for an episode.
+
+    The robot has Menagerie's meshes where they are on this machine. Physics are the same; what sensors saw is not.
+    """
+    environment = environment_of(replace(config, robot_visuals=picture_visuals()))
     environment.reset(spec)
     return environment.physics.model.ptr, environment.physics.data.ptr
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import mujoco
 import numpy as np
@@ -33,11 +33,20 @@ __all__ = [
     "TCP_SPEED_LIMIT",
     "TORQUE_LIMITS",
     "VELOCITY_LIMITS",
+    "VISUALS",
     "Panda",
     "PandaObservables",
+    "Visuals",
+    "picture_visuals",
 ]
 
-Visuals = Literal["auto", "primitive", "menagerie"]
+Visuals = Literal["primitive", "menagerie"]
+VISUALS: tuple[Visuals, ...] = get_args(Visuals)
+
+
+def picture_visuals() -> Visuals:
+    """How pictures show the robot, which nothing is measured by: with Menagerie's meshes where they are on this machine."""
+    return "primitive" if find_menagerie_panda() is None else "menagerie"
 
 
 class Panda(composer.Entity):
@@ -48,23 +57,19 @@ class Panda(composer.Entity):
     stiffness, whatever they touch.
     """
 
-    def _build(self, visuals: Visuals = "auto", name: str = "panda") -> None:
+    def _build(self, visuals: Visuals = "primitive", name: str = "panda") -> None:
         """Builds the robot.
 
         Args:
-            visuals: "primitive" draws capsules and boxes; "menagerie" draws Menagerie's meshes;
-                "auto" takes the meshes where they are on this machine.
+            visuals: "primitive" draws capsules and boxes; "menagerie" draws Menagerie's meshes.
             name: the model's name, which prefixes every element of a scene.
 
         Raises:
             InputError: `visuals` is none of these, or "menagerie" was asked for and is not there.
         """
-        if visuals not in ("auto", "primitive", "menagerie"):
-            raise unknown_name("visuals", visuals, ("auto", "primitive", "menagerie"))
-        if visuals == "menagerie":
-            folder = require_menagerie_panda()
-        else:
-            folder = find_menagerie_panda() if visuals == "auto" else None
+        if visuals not in VISUALS:
+            raise unknown_name("visuals", visuals, VISUALS)
+        folder = require_menagerie_panda() if visuals == "menagerie" else None
         self._model = build_panda(name, folder)
         self._joints = [self._model.find("joint", f"joint{i}") for i in range(1, 8)]
         self._finger_joints = [self._model.find("joint", f"finger_joint{i}") for i in (1, 2)]

@@ -13,6 +13,7 @@ from manipose_mj.actions import CONTROL_MODES
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.categories import SPLITS, Split
 from manipose_mj.errors import InputError, brief, unknown_name
+from manipose_mj.mjcf.panda.robot import VISUALS, Visuals
 from manipose_mj.tasks.core.object_selection import is_folder, select_assets
 from manipose_mj.tasks.core.randomisation import STRENGTHS
 from manipose_mj.tasks.core.start_check import check_pose
@@ -44,6 +45,8 @@ class EnvConfig:
       randomisation: Name of a strength of domain randomisation.
       sensors: Cameras, images, clouds and their noise.
       latency: By how much servo targets come late, beside what `randomisation` draws [s].
+      robot_visuals: How the robot looks, to sensors too: `"primitive"`, alike on every machine; or `"menagerie"`, which
+        needs Menagerie's meshes.
 
     Raises:
       InputError: A mode, split or strength is unknown, and the nearest names are offered; `objects` and `split` name
@@ -59,6 +62,7 @@ class EnvConfig:
     randomisation: str = "none"
     sensors: SensorConfig = SensorConfig()
     latency: float = 0.0
+    robot_visuals: Visuals = "primitive"
 
     def __post_init__(self) -> None:
         number = isinstance(self.latency, int | float | np.number)
@@ -72,6 +76,7 @@ class EnvConfig:
             ("reward mode", self.reward_mode, REWARD_MODES),
             ("split", self.split, SPLITS),
             ("randomisation", self.randomisation, STRENGTHS),
+            ("robot visuals", self.robot_visuals, VISUALS),
         ):
             if value not in known:
                 raise unknown_name(what, value, known)

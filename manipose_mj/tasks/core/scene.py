@@ -12,7 +12,7 @@ from jaxtyping import Float
 from manipose_mj.assets.asset import Asset
 from manipose_mj.mjcf.arena import TableArena
 from manipose_mj.mjcf.objects import ArticulatedObject, RigidObject
-from manipose_mj.mjcf.panda.robot import Panda
+from manipose_mj.mjcf.panda.robot import Panda, Visuals
 from manipose_mj.poses import compose
 from manipose_mj.tasks.core.start import EpisodeStart
 from manipose_mj.tasks.scene.furniture_pool import FurniturePool
@@ -41,10 +41,10 @@ class Scene:
       instances: What segmentation tells apart, by name, counted from 1.
     """
 
-    def __init__(self) -> None:
-        """The table and the robot."""
+    def __init__(self, robot_visuals: Visuals = "primitive") -> None:
+        """The table and the robot, drawn as `Panda` says."""
         self.arena = TableArena()
-        self.robot = Panda()
+        self.robot = Panda(robot_visuals)
         self.arena.attach(self.robot)
         self.objects: ObjectPool | None = None
         self.furniture: FurniturePool | None = None

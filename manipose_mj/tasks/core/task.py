@@ -61,7 +61,7 @@ class ManipulationTask(composer.Task):
         """An empty table."""
         self.config = config
         self.env_config = env_config
-        self.scene = Scene()
+        self.scene = Scene(env_config.robot_visuals)
         self.robot = self.scene.robot
         self.control_mode = actions.control_mode(env_config.control_mode)
         self.spec = EpisodeSpec()

@@ -24,6 +24,7 @@ from manipose_mj.mjcf.panda.robot import (
     TORQUE_LIMITS,
     VELOCITY_LIMITS,
     Panda,
+    picture_visuals,
 )
 from tests.places import REAL_DATA
 
@@ -285,14 +286,14 @@ def trajectory(visuals):
 def test_meshes_leave_the_trajectory_bit_identical(menagerie, monkeypatch):
     monkeypatch.setenv("MENAGERIE_ROOT", str(menagerie))
     plain, contacts, meshes = trajectory("primitive")
-    drawn, _, drawn_meshes = trajectory("auto")
+    drawn, _, drawn_meshes = trajectory("menagerie")
     assert (meshes, drawn_meshes > 50, contacts > 0) == (0, True, True)
     assert np.array_equal(plain, drawn)
 
 
 def test_visuals_ask_for_what_is_there(monkeypatch, tmp_path):
     monkeypatch.setenv("MENAGERIE_ROOT", str(tmp_path))
-    Panda(visuals="auto")
+    assert picture_visuals() == "primitive"
     with pytest.raises(InputError, match="MENAGERIE_ROOT"):
         Panda(visuals="menagerie")
     with pytest.raises(InputError, match="did you mean menagerie"):

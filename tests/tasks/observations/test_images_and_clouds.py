@@ -7,13 +7,18 @@ import time
 import numpy as np
 import pytest
 
+from manipose_mj import suite
 from manipose_mj.errors import InputError
+from manipose_mj.evaluation.episode import start_state
 from manipose_mj.mjcf.cameras import gl
+from manipose_mj.mjcf.panda.robot import Visuals
 from manipose_mj.poses import compose, invert, transform
+from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from manipose_mj.tasks.core.task import ManipulationTask
 from manipose_mj.tasks.observations.sensors import SensorConfig
 from tests import few_objects
-from tests.tasks.observed_scenes import ABOVE, STORE, TARGET_POSE, load
+from tests.fake_menagerie import write_menagerie
+from tests.tasks.observed_scenes import ABOVE, STORE, TARGET_POSE, hold, load
 
 
 def test_a_camera_of_ones_own_sees_what_it_looks_at():
@@ -126,3 +131,28 @@ def test_the_cloud_of_three_cameras_is_quick():
         task.observables["pointcloud/points"](environment.physics)
         times.append(time.process_time() - start)
     assert min(times) < 0.2
+
+
+def test_meshes_of_menagerie_show_in_pictures_and_not_to_sensors(monkeypatch, tmp_path):
+    def seen():
+        environment = load(TARGET_POSE, "state+rgb+depth+segmentation+pointcloud")
+        environment.reset()
+        return environment.step(hold(environment)).observation
+
+    def meshes(visuals: Visuals = "primitive"):
+        config = EnvConfig(
+            "single_object/target_pose", "state", objects=("mug_000",), robot_visuals=visuals
+        )
+        environment = suite.make(config, 0)
+        return environment.physics.model.nmesh, start_state(config, EpisodeSpec(0))[0].nmesh
+
+    monkeypatch.delenv("MENAGERIE_ROOT", raising=False)
+    without, (plain, drawn) = seen(), meshes()
+    assert drawn == plain
+    monkeypatch.setenv("MENAGERIE_ROOT", str(write_menagerie(tmp_path)))
+    observation, (measured, drawn) = seen(), meshes()
+    assert {*without} == {*observation}
+    for name, values in without.items():
+        np.testing.assert_array_equal(observation[name], values, name)
+    assert (measured, drawn) == (plain, plain + 1)
+    assert meshes("menagerie")[0] == plain + 1
