@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from manipose_mj.errors import how_to_install
+from manipose_mj.errors import InputError, how_to_install
 
 DISTRIBUTION = "manipose-mj"
 _SCENE = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
@@ -175,12 +175,15 @@ def _require(*modules: str) -> None:
 
 def _visuals() -> Finding:
     """Menagerie's meshes, which only make pictures nicer."""
-    from manipose_mj.mjcf.panda.menagerie import find_menagerie_panda
+    from manipose_mj.mjcf.panda.menagerie import PREFETCH, find_menagerie_panda
 
-    folder = find_menagerie_panda()
+    try:
+        folder = find_menagerie_panda()
+    except InputError as error:
+        return Finding("extras", "Menagerie visuals", "absent", str(error))
     if folder is not None:
         return Finding("extras", "Menagerie visuals", "ok", str(folder))
-    prefetch = f"{sys.executable} -m mujoco_menagerie prefetch franka_emika_panda"
+    prefetch = PREFETCH.replace("python", sys.executable, 1)
     if importlib.util.find_spec("mujoco_menagerie") is None:
         prefetch = f"{how_to_install('render')}, then {prefetch}"
     return Finding("extras", "Menagerie visuals", "absent", prefetch)

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import os
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.panda.geometry import MATERIALS
+from manipose_mj.mjcf.panda.kinematics import INERTIALS
 
+ROOT_VARIABLE = "MENAGERIE_ROOT"
 _ROBOT = "franka_emika_panda"
+PREFETCH = f"python -m mujoco_menagerie prefetch {_ROBOT}"
+
+logger = logging.getLogger(__name__)
 
 
 class VisualMesh(NamedTuple):
@@ -22,23 +30,27 @@ class VisualMesh(NamedTuple):
 
 
 def find_menagerie_panda() -> Path | None:
-    """Menagerie's Panda folder, or None; never downloads.
+    """Menagerie's Panda folder with every mesh that it draws, or None; never downloads.
 
-    Looked for under the environment variable `MENAGERIE_ROOT`; where that is unset, in the cache of
-    the `mujoco_menagerie` package.
+    Looked for under the environment variable `MENAGERIE_ROOT`; where that is unset, in the cache of the
+    `mujoco_menagerie` package. A folder there that is incomplete is warned of, and is None.
+
+    Raises:
+        InputError: `MENAGERIE_ROOT` is set and holds no complete folder.
     """
-    if root := os.environ.get("MENAGERIE_ROOT"):
-        folder = Path(root) / _ROBOT
-    elif importlib.util.find_spec("mujoco_menagerie"):
-        import mujoco_menagerie  # pyright: ignore[reportMissingImports]
-
-        cache, robot = mujoco_menagerie.Cache(), mujoco_menagerie.get(_ROBOT)
-        if not cache.is_cached(robot):
-            return None
-        folder = cache.model_path(robot)
-    else:
+    root = os.environ.get(ROOT_VARIABLE)
+    folder = Path(root) / _ROBOT if root else _cached()
+    if folder is None:
         return None
-    return folder if (folder / "panda.xml").is_file() else None
+    fault = _fault(folder)
+    if not fault:
+        return folder
+    if root:
+        raise InputError(
+            f"{ROOT_VARIABLE}={root}: {fault}; point it at a complete copy of MuJoCo Menagerie, or unset it"
+        )
+    _warn_once(f"{fault}; pictures show plain shapes until `{PREFETCH}` has fetched it again")
+    return None
 
 
 def require_menagerie_panda() -> Path:
@@ -50,13 +62,58 @@ def require_menagerie_panda() -> Path:
     if folder := find_menagerie_panda():
         return folder
     raise InputError(
-        f'visuals="menagerie": no {_ROBOT}/panda.xml; point MENAGERIE_ROOT at a folder that holds '
-        f"{_ROBOT}, or run `python -m mujoco_menagerie prefetch {_ROBOT}`"
+        f'visuals="menagerie": no {_ROBOT}/panda.xml; point {ROOT_VARIABLE} at a folder that holds '
+        f"{_ROBOT}, or run `{PREFETCH}`"
     )
 
 
+def _cached() -> Path | None:
+    """Where the `mujoco_menagerie` package keeps the folder, if it has fetched it."""
+    if not importlib.util.find_spec("mujoco_menagerie"):
+        return None
+    import mujoco_menagerie  # pyright: ignore[reportMissingImports]
+
+    fetched, robot = mujoco_menagerie.Cache(), mujoco_menagerie.get(_ROBOT)
+    return fetched.model_path(robot) if fetched.is_cached(robot) else None
+
+
+def _fault(folder: Path) -> str:
+    """What is wrong with a folder, in one line; "" if nothing is."""
+    path = folder / "panda.xml"
+    if not path.is_file():
+        return f"no {path}"
+    try:
+        meshes = visual_meshes(folder)
+    except ElementTree.ParseError as error:
+        return f"{path}: no XML ({error})"
+    except KeyError as error:
+        return f"{path}: not Menagerie's ({error} is missing)"
+    except OSError as error:
+        return f"{path}: cannot be read ({error.strerror})"
+    if not meshes:
+        return f"{path}: draws no mesh"
+    for mesh in meshes:
+        if mesh.body not in INERTIALS or mesh.material not in MATERIALS:
+            return f"{path}: not Menagerie's (body {mesh.body}, material {mesh.material})"
+        if not mesh.file.is_file():
+            return f"no {mesh.file}, which panda.xml draws"
+        if not mesh.file.stat().st_size:
+            return f"{mesh.file} is empty"
+    return ""
+
+
+@cache
+def _warn_once(message: str) -> None:
+    logger.warning("%s", message)
+
+
 def visual_meshes(folder: Path) -> list[VisualMesh]:
-    """The visual meshes that `folder`'s panda.xml draws, in its order."""
+    """The visual meshes that `folder`'s panda.xml draws, in its order.
+
+    Raises:
+        KeyError: a body, geom or mesh lacks what Menagerie's have.
+        xml.etree.ElementTree.ParseError: the file is no XML.
+    """
     root = ElementTree.parse(folder / "panda.xml").getroot()
     compiler = root.find("compiler")
     assets = folder if compiler is None else folder / compiler.get("meshdir", "")

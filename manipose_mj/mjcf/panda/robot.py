@@ -45,7 +45,11 @@ VISUALS: tuple[Visuals, ...] = get_args(Visuals)
 
 
 def picture_visuals() -> Visuals:
-    """How pictures show the robot, which nothing is measured by: with Menagerie's meshes where they are on this machine."""
+    """How pictures show the robot, which nothing is measured by: with Menagerie's meshes where they are on this machine.
+
+    Raises:
+        InputError: they are not where `MENAGERIE_ROOT` says.
+    """
     return "primitive" if find_menagerie_panda() is None else "menagerie"
 
 

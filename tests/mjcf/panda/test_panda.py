@@ -291,10 +291,11 @@ def test_meshes_leave_the_trajectory_bit_identical(menagerie, monkeypatch):
     assert np.array_equal(plain, drawn)
 
 
-def test_visuals_ask_for_what_is_there(monkeypatch, tmp_path):
-    monkeypatch.setenv("MENAGERIE_ROOT", str(tmp_path))
+def test_visuals_ask_for_what_is_there(monkeypatch):
+    monkeypatch.delenv("MENAGERIE_ROOT", raising=False)
+    monkeypatch.setattr("manipose_mj.mjcf.panda.menagerie._cached", lambda: None)
     assert picture_visuals() == "primitive"
-    with pytest.raises(InputError, match="MENAGERIE_ROOT"):
+    with pytest.raises(InputError, match="point MENAGERIE_ROOT at a folder"):
         Panda(visuals="menagerie")
     with pytest.raises(InputError, match="did you mean menagerie"):
         Panda(visuals="menagery")
