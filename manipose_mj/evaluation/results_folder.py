@@ -42,7 +42,7 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
             lock(file, out, "evaluation")
             try:
                 yield file
-            except InputError:
+            except BaseException:
                 _remove_if_empty(file, out, new)
                 raise
     except OSError as error:

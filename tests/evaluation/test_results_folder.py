@@ -67,3 +67,14 @@ def test_only_a_failure_of_the_folder_is_told_as_one(tmp_path, name, number, our
     with pytest.raises(InputError if ours else OSError) as failure:
         evaluate(config(tmp_path / "r"), runner=failing)
     assert ("cannot write results there" in str(failure.value)) is ours
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
+def test_what_ends_before_the_first_result_leaves_no_new_folder(tmp_path, failure):
+    def interrupted(results, total):
+        raise failure
+
+    out = tmp_path / "new" / "r"
+    with pytest.raises(failure):
+        evaluate(config(out), runner=fake.make_runner(), on_progress=interrupted)
+    assert not out.exists()
