@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from manipose_mj.cli.evaluate import run_and_report
 from manipose_mj.console.process import CORES, prepare_workers
+from manipose_mj.errors import InputError
 
 # Of every family, the paper's experiments first.
 TASKS = (
@@ -38,8 +39,10 @@ def demo(
     from manipose_mj.cli.builtin_objects import load_objects, names_in_protocol
     from manipose_mj.evaluation.config import EvaluationConfig
     from manipose_mj.evaluation.protocol import VERSIONS
+    from manipose_mj.mjcf.panda.robot import picture_visuals
 
     config = EvaluationConfig(TASKS, out, episodes=EPISODES, jobs=jobs, protocol=VERSIONS[0])
+    picture_visuals()  # refuses a wrong folder before anything is built or replaced
     _claim(out)
     load_objects(names_in_protocol(VERSIONS[0], TASKS, EPISODES), jobs)
     return run_and_report(config, resume=False)
@@ -48,10 +51,8 @@ def demo(
 def _claim(out: Path) -> None:
     """Drop an earlier demo's results and mark the folder as a demo's.
 
-    Results that are not a demo's stay, and the evaluation then refuses the folder.
-
     Raises:
-      InputError: Another demo or evaluation is writing there, or nobody can.
+      InputError: Another demo or evaluation is writing there, nobody can, or there are results of something else.
     """
     from manipose_mj.evaluation.results_folder import results_file
 
@@ -59,7 +60,7 @@ def _claim(out: Path) -> None:
     with results_file(out) as file:
         if mark.exists():
             file.truncate(0)
-        elif not os.fstat(file.fileno()).st_size:
-            mark.write_text(
-                "`manipose demo` replaces the results in this folder.\n", encoding="utf-8"
-            )
+            return
+        if os.fstat(file.fileno()).st_size:
+            raise InputError(f"{out}: holds results that are not a demo's; choose another --out")
+        mark.write_text("`manipose demo` replaces the results in this folder.\n", encoding="utf-8")

@@ -116,6 +116,8 @@ def evaluate(
     from manipose_mj.evaluation.planner_settings import EXCHANGES, PlannerSettings
     from manipose_mj.evaluation.policy_settings import PolicySettings
     from manipose_mj.evaluation.protocol.frozen import EPISODES
+    from manipose_mj.evaluation.results_folder import check_folder
+    from manipose_mj.mjcf.panda.robot import picture_visuals
     from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
     from manipose_mj.tasks.core.registry import tasks_named
 
@@ -166,8 +168,11 @@ def evaluate(
         assets=assets,
     )
     named = check_names(tasks, objects)
+    # Before minutes are spent on building objects, and hours on episodes that the report shall show.
+    check_folder(out, resume=resume)
+    picture_visuals()
     if config.estimator is not None:
-        load_estimator(config.estimator)  # before minutes are spent on building objects
+        load_estimator(config.estimator)
     if protocol is not None:
         named = names_in_protocol(protocol, tasks, episodes)
     with cluster(dask):

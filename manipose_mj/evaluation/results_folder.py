@@ -93,6 +93,33 @@ def lock(file: IO[bytes], out: Path, what: str) -> None:
         raise InputError(f"{out}: another {what} is writing there; wait for it") from None
 
 
+def check_folder(out: Path, *, resume: bool) -> None:
+    """Find out early whether an evaluation can use a folder; nothing is left there.
+
+    Args:
+      out: The folder.
+      resume: Whether results may be there.
+
+    Raises:
+      InputError: Nobody can write there, another evaluation is writing, the results are not an evaluation's, or there
+        are some and `resume` is False.
+    """
+    new = not out.exists()
+    with results_file(out) as file:
+        _results_before(out, resume=resume)
+        _remove_if_empty(file, out, new)
+
+
+def _results_before(out: Path, *, resume: bool) -> tuple[list[EpisodeResult], int]:
+    """As `read_results`; raises InputError where there are some and `resume` is False."""
+    results, size = read_results(out / RESULTS_FILE)
+    if results and not resume:
+        raise InputError(
+            f"{out}: holds {len(results)} results; add --resume or choose another --out"
+        )
+    return results, size
+
+
 def kept_results(
     out: Path,
     identity: dict[str, Any],
@@ -114,11 +141,7 @@ def kept_results(
       InputError: There are results and `resume` is False, or they belong to another configuration, or one is of an
         episode or a seed that this run does not ask for; the file stays as it is.
     """
-    results, size = read_results(out / RESULTS_FILE)
-    if results and not resume:
-        raise InputError(
-            f"{out}: holds {len(results)} results; add --resume or choose another --out"
-        )
+    results, size = _results_before(out, resume=resume)
     if results:
         before = _run_before(out)
         for name, value in identity.items():

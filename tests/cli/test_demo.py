@@ -33,12 +33,17 @@ def test_a_demo_at_work_keeps_its_folder(tmp_path, played, capsys):
     assert (tmp_path / RESULTS_FILE).read_bytes() == b"a result\n" and not played
 
 
-def test_an_earlier_demo_is_replaced_and_other_results_are_not(tmp_path, played):
+def test_an_earlier_demo_is_replaced_and_other_results_are_not(tmp_path, played, capsys):
     demo, other = tmp_path / "demo", tmp_path / "other"
     other.mkdir()
     (other / RESULTS_FILE).write_bytes(b"a result\n")
-    for out in (demo, demo, other):
+    for out in (demo, demo):
         assert main(["demo", "--jobs", "1", "--out", str(out)]) == 0
         with results_file(out) as file:
             file.write(b"another\n")
-    assert played == [b"", b"", b"a result\n"] and not (other / MARK).exists()
+    assert main(["demo", "--jobs", "1", "--out", str(other)]) == 2
+    assert capsys.readouterr().err == (
+        f"manipose: {other}: holds results that are not a demo's; choose another --out\n"
+    )
+    assert played == [b"", b""] and not (other / MARK).exists()
+    assert (other / RESULTS_FILE).read_bytes() == b"a result\n"

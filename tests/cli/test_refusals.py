@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+import tests.evaluation.fake_episodes as fake
 from manipose_mj.cli.main import EXIT_INPUT, main
+from manipose_mj.evaluation.config import EvaluationConfig
+from manipose_mj.evaluation.results_folder import RESULTS_FILE
+from manipose_mj.evaluation.runner import evaluate as run_evaluation
 
 TASK = "single_object/target_pose"
 IN_PARALLEL = (
@@ -84,3 +88,57 @@ def test_evaluations_that_cannot_be_leave_no_folder(wrong, said, tmp_path, monke
     assert main(f"evaluate {TASK} --jobs 1 --out {out} {wrong}".split()) == EXIT_INPUT
     assert said in complaint(capsys)
     assert not out.exists()
+
+
+@pytest.fixture
+def building(monkeypatch):
+    """Building objects, which must not begin."""
+
+    def build(names, jobs):
+        raise AssertionError("objects are built")
+
+    monkeypatch.setattr("manipose_mj.cli.builtin_objects.load_objects", build)
+
+
+def test_a_folder_with_results_is_refused_before_objects_are_built(building, tmp_path, capsys):
+    config = EvaluationConfig(fake.TASKS[:1], tmp_path, episodes=2)
+    run_evaluation(config, runner=fake.make_runner())
+    before = (tmp_path / RESULTS_FILE).read_bytes()
+    assert main(f"evaluate {TASK} --jobs 1 --out {tmp_path}".split()) == EXIT_INPUT
+    assert complaint(capsys) == (
+        f"{tmp_path}: holds 2 results; add --resume or choose another --out"
+    )
+    assert (tmp_path / RESULTS_FILE).read_bytes() == before
+
+
+@pytest.mark.parametrize("command", [f"evaluate {TASK}", "demo"])
+def test_a_place_that_is_no_folder_is_refused_before_objects_are_built(
+    command, building, tmp_path, capsys
+):
+    out = tmp_path / "file"
+    out.touch()
+    assert main(f"{command} --jobs 1 --out {out}/r".split()) == EXIT_INPUT
+    assert complaint(capsys) == (
+        f"{out}/r: cannot write there (Not a directory); choose another --out"
+    )
+
+
+@pytest.mark.parametrize("command", [f"evaluate {TASK}", "demo"])
+def test_a_wrong_menagerie_is_refused_before_objects_are_built(
+    command, building, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv("MENAGERIE_ROOT", str(tmp_path / "nowhere"))
+    assert main(f"{command} --jobs 1 --out {tmp_path}/r".split()) == EXIT_INPUT
+    assert complaint(capsys).startswith(f"MENAGERIE_ROOT={tmp_path}/nowhere: no ")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_folder_is_as_it_was_while_objects_are_built(tmp_path, monkeypatch):
+    found = []
+    monkeypatch.setattr(
+        "manipose_mj.cli.builtin_objects.load_objects",
+        lambda names, jobs: found.extend(tmp_path.iterdir()),
+    )
+    monkeypatch.setattr("manipose_mj.cli.evaluate.run_and_report", lambda config, resume: 0)
+    assert main(f"evaluate {TASK} --jobs 1 --out {tmp_path}/r".split()) == 0
+    assert not found
