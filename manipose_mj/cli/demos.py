@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
-from tyro.extras import SubcommandApp
 
+from manipose_mj.console.command_line import CommandApp
 from manipose_mj.console.process import CORES, one_thread_per_process, prepare_workers
 from manipose_mj.errors import InputError
 
 
-def build_app() -> SubcommandApp:
+def build_app() -> CommandApp:
     """The commands under `manipose demos`."""
-    app = SubcommandApp()
-    app.command(name="record")(record_demos)
-    app.command(name="replay")(replay_demos)
-    app.command(name="export")(export_demos)
+    app = CommandApp()
+    app.add("record", record_demos)
+    app.add("replay", replay_demos)
+    app.add("export", export_demos)
     return app
 
 
@@ -31,7 +31,9 @@ def record_demos(
     jobs: int = CORES,
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
     failures: Annotated[bool, arg(help_behavior_hint="")] = False,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    objects: Annotated[
+        tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...", help_behavior_hint="")
+    ] = (),
 ) -> int:
     """Record demonstrations of the baseline with true poses, on training objects, at 50 Hz.
 

@@ -31,7 +31,9 @@ def evaluate(
     jobs: int = CORES,
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None,
     resume: Annotated[bool, arg(help_behavior_hint="")] = False,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    objects: Annotated[
+        tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...", help_behavior_hint="")
+    ] = (),
     protocol: Annotated[str | None, arg(metavar="v1|v1-real", help_behavior_hint="")] = None,
     assets: Annotated[tuple[str, ...], arg(metavar="DIR...", help_behavior_hint="")] = (),
     resample: Annotated[int | None, arg(metavar="SEED", help_behavior_hint="")] = None,

@@ -7,9 +7,6 @@ import os
 import sys
 from collections.abc import Sequence
 
-import tyro
-from tyro.extras import SubcommandApp
-
 from manipose_mj.cli import (
     card,
     demo,
@@ -25,34 +22,29 @@ from manipose_mj.cli.assets.app import build_app as build_assets_app
 from manipose_mj.cli.pose.app import build_app as build_pose_app
 from manipose_mj.cli.protocol import build_app as build_protocol_app
 from manipose_mj.cli.train import build_app as build_train_app
+from manipose_mj.console.command_line import CommandApp, parse
 from manipose_mj.errors import InputError, WorkerDiedError
 
 DESCRIPTION = "A MuJoCo benchmark for pose-aware robot manipulation."
 EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_PIPE = 1, 2, 130, 141
 
 
-def build_app() -> SubcommandApp:
+def build_app() -> CommandApp:
     """Every subcommand; each loads what it needs only when it runs."""
-    app = SubcommandApp()
-    app.command(demo.demo)
-    app.command(evaluate.evaluate)
-    app.command(robustness.robustness)
-    app.command(card.card)
-    app.command(name="list")(tasks.list_tasks)
-    app.command(render.render)
-    app.command(view.view)
-    app.command(build_assets_app(), name="assets", help="Build, check and inspect object assets.")
-    app.command(
-        demos.build_app(), name="demos", help="Record demonstrations, replay and export them."
-    )
-    app.command(build_pose_app(), name="pose", help="Train, evaluate and score pose estimators.")
-    app.command(build_train_app(), name="train", help="Learn policies on batched worlds.")
-    app.command(
-        build_protocol_app(),
-        name="protocol",
-        help="Certify that a protocol's starts can be solved.",
-    )
-    app.command(doctor.doctor)
+    app = CommandApp()
+    app.add("demo", demo.demo)
+    app.add("evaluate", evaluate.evaluate)
+    app.add("robustness", robustness.robustness)
+    app.add("card", card.card)
+    app.add("list", tasks.list_tasks)
+    app.add("render", render.render)
+    app.add("view", view.view)
+    app.add("assets", build_assets_app(), "Build, check and inspect object assets.")
+    app.add("demos", demos.build_app(), "Record demonstrations, replay and export them.")
+    app.add("pose", build_pose_app(), "Train, evaluate and score pose estimators.")
+    app.add("train", build_train_app(), "Learn policies on batched worlds.")
+    app.add("protocol", build_protocol_app(), "Certify that a protocol's starts can be solved.")
+    app.add("doctor", doctor.doctor)
     return app
 
 
@@ -63,10 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     130: interrupted.
     """
     try:
-        config = (tyro.conf.FlagCreatePairsOff,)
-        return (
-            build_app().cli(prog="manipose", description=DESCRIPTION, args=argv, config=config) or 0
-        )
+        run = parse(build_app(), argv, prog="manipose", description=DESCRIPTION)
+        return run() or 0
     except InputError as error:
         return _fail(str(error), EXIT_INPUT)
     except WorkerDiedError as error:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
-from tyro.extras import SubcommandApp
 
+from manipose_mj.console.command_line import CommandApp
 from manipose_mj.console.process import (
     CORES,
     keep_to_avx2,
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 _EXIT_FAILED = 1
 
 
-def build_app() -> SubcommandApp:
+def build_app() -> CommandApp:
     """The commands under `manipose protocol`."""
-    app = SubcommandApp()
-    app.command(name="verify")(verify_protocol)
-    app.command(name="certify")(certify_protocol)
-    app.command(name="assets")(protocol_assets)
+    app = CommandApp()
+    app.add("verify", verify_protocol)
+    app.add("certify", certify_protocol)
+    app.add("assets", protocol_assets)
     return app
 
 

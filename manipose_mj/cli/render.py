@@ -19,7 +19,7 @@ def render(
     camera: str = "overview",
     height: int = 480,
     width: int = 640,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...")] = (),
+    objects: Annotated[tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...")] = (),
 ) -> None:
     """Save a picture of a task at the start of an episode.
 

@@ -37,7 +37,9 @@ def robustness(
     turn_deg: float = 5.0,
     object_shift_cm: float = 0.5,
     object_turn_deg: float = 2.0,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    objects: Annotated[
+        tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...", help_behavior_hint="")
+    ] = (),
     jobs: int = CORES,
 ) -> int:
     """Play recorded plans of the baseline open loop in worlds that differ from that they were made in, and map success.

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
-from tyro.extras import SubcommandApp
 
+from manipose_mj.console.command_line import CommandApp
 from manipose_mj.console.process import CORES, compile_at_once_on_gpus, prepare_workers
 from manipose_mj.errors import InputError
 
 
-def build_app() -> SubcommandApp:
+def build_app() -> CommandApp:
     """The commands under `manipose train`."""
-    app = SubcommandApp()
-    app.command(name="ppo")(train_ppo)
+    app = CommandApp()
+    app.add("ppo", train_ppo)
     return app
 
 
@@ -33,7 +33,9 @@ def train_ppo(
     episode: Annotated[float, arg(metavar="SECONDS")] = 12.0,
     engine: Literal["auto", "c", "warp"] = "auto",
     jobs: int = CORES,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...", help_behavior_hint="")] = (),
+    objects: Annotated[
+        tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...", help_behavior_hint="")
+    ] = (),
     pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     policy: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> int:

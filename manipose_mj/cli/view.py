@@ -13,7 +13,7 @@ def view(
     /,
     *,
     seed: int = 0,
-    objects: Annotated[tuple[str, ...], arg(metavar="NAME|DIR...")] = (),
+    objects: Annotated[tuple[str, ...], arg(aliases=("--object",), metavar="NAME|DIR...")] = (),
 ) -> None:
     """Show a task in a window, in real time; the arm holds still, and the mouse can push things.
 

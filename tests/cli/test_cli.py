@@ -98,10 +98,8 @@ def test_evaluate_has_the_documented_flags(capsys) -> None:
 @pytest.mark.parametrize(
     "argv",
     [
-        "evalute",
         "evaluate single_object/target_pose --episodes many",
         "evaluate single_object/target_pose --pose guessed",
-        "evaluate single_object/target_pose --episode 3",
         "render single_object/target_pose",
         "assets",
     ],

@@ -142,3 +142,61 @@ def test_the_folder_is_as_it_was_while_objects_are_built(tmp_path, monkeypatch):
     monkeypatch.setattr("manipose_mj.cli.evaluate.run_and_report", lambda config, resume: 0)
     assert main(f"evaluate {TASK} --jobs 1 --out {tmp_path}/r".split()) == 0
     assert not found
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("evalute", "unknown command 'evalute'; did you mean evaluate?"),
+        ("assets bild", "unknown assets command 'bild'; did you mean build?"),
+        (
+            f"evaluate {TASK} --object mug_000 --episods 3",
+            "unknown option of evaluate '--episods'; did you mean --episodes, --pose, --worlds?",
+        ),
+        (
+            f"evaluate {TASK} --pose_error_c=3",
+            "unknown option of evaluate '--pose_error_c'; did you mean --pose-error-cm, --pose-error-deg, --pose?",
+        ),
+        (
+            "assets build meshes x --typ axial",
+            "unknown option of assets build '--typ'; did you mean --type, --up, --out?",
+        ),
+        ("doctor --everything", "unknown option of doctor '--everything'; known: --help"),
+    ],
+)
+def test_misspelt_words_of_the_command_line_are_told_in_one_line(line, said, capsys):
+    assert main(line.split()) == EXIT_INPUT
+    assert complaint(capsys) == said
+
+
+@pytest.mark.parametrize(
+    ("line", "shown"),
+    [
+        (f"evaluate {TASK} --pose guessed --episods 3", "guessed"),
+        ("doctor now", "now"),
+        ("demos", "record"),
+    ],
+)
+def test_what_else_is_wrong_tyro_tells(line, shown, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(line.split())
+    told = capsys.readouterr().err
+    assert end.value.code == EXIT_INPUT and shown in told and "unknown option" not in told
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        f"evaluate {TASK}",
+        f"robustness {TASK}",
+        f"render {TASK} --out a.png",
+        f"view {TASK}",
+        f"demos record {TASK} --out demos",
+        f"train ppo {TASK}",
+    ],
+)
+def test_one_object_may_be_called_object(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command.split(), "--object", "mugg_000"]) == EXIT_INPUT
+    assert "did you mean mug_000" in complaint(capsys)
+    assert not list(tmp_path.iterdir())

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from importlib.metadata import entry_points
 
-from tyro.extras import SubcommandApp
-
 from manipose_mj.cli.assets.list import list_objects, show_statistics
 from manipose_mj.cli.assets.sheet import draw_sheets
 from manipose_mj.cli.assets.show import show_asset
+from manipose_mj.console.command_line import CommandApp
 
 GROUP = "manipose_mj.asset_commands"
 
 
-def build_app() -> SubcommandApp:
+def build_app() -> CommandApp:
     """The commands under `manipose assets`, by name."""
     commands = {
         "list": list_objects,
@@ -26,7 +25,7 @@ def build_app() -> SubcommandApp:
         "stats": show_statistics,
         **{entry.name: entry.load() for entry in entry_points(group=GROUP)},
     }
-    app = SubcommandApp()
+    app = CommandApp()
     for name in sorted(commands):
-        app.command(name=name)(commands[name])
+        app.add(name, commands[name])
     return app
