@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 _AT_MOST = 60  # names that an error spells out
 _MOST = 60  # letters of a value that it shows
+_REPLACED = "A worker stopped while some jobs were given to the executor"  # joblib's words
 
 
 class InputError(ValueError):
@@ -81,11 +83,16 @@ class ServerLostError(WorkerDiedError):
 
 @contextmanager
 def worker_deaths(kept: str) -> Iterator[None]:
-    """Inside, the death of one of joblib's worker processes is a `WorkerDiedError`; `kept`: what of the work is, where."""
+    """Inside, the death of one of joblib's worker processes is a `WorkerDiedError`; `kept`: what of the work is, where.
+
+    Nothing is said of workers that joblib replaces because they have grown: their tasks are done.
+    """
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", _REPLACED, UserWarning)
+            yield
     except TerminatedWorkerError as error:
         raise WorkerDiedError(
             f"a worker process died ({' '.join(str(error).split())[:200]}); {kept}, and fewer --jobs if memory ran out"

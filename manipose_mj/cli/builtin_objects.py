@@ -20,6 +20,7 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
       InputError: There is none of a name, or the cache cannot be written.
     """
     import joblib
+    from joblib.externals.loky import get_reusable_executor
 
     from manipose_mj.assets import catalogue
     from manipose_mj.console import output
@@ -31,6 +32,8 @@ def load_objects(names: Sequence[str], jobs: int) -> list[Asset]:
             calls = (joblib.delayed(catalogue.load_by_name)(name) for name in missing)
             for done, asset in enumerate(pool(calls), start=1):
                 progress.update(done, len(missing), f"{asset.name} is built")
+        # What comes next starts in workers without what building has left in their memory.
+        get_reusable_executor().shutdown()
     return [catalogue.load_by_name(name) for name in names]
 
 

@@ -9,9 +9,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import joblib
 import pytest
 
 import tests.evaluation.fake_episodes as fake
+from manipose_mj.cli.builtin_objects import load_objects
 from manipose_mj.cli.diagnosis import Finding
 from manipose_mj.cli.main import main
 from manipose_mj.evaluation.records import read_results
@@ -289,3 +291,13 @@ def test_doctor_fails_only_for_what_is_needed(status, code, monkeypatch, capsys)
     shown = capsys.readouterr().out
     assert "install [extra]" in shown
     assert ("needed and missing: MuJoCo C" in shown) == (code == 1)
+
+
+def test_building_objects_leaves_no_worker_to_what_comes_next(monkeypatch) -> None:
+    def workers() -> set[int]:
+        return set(joblib.Parallel(n_jobs=2)(joblib.delayed(os.getpid)() for _ in range(8)))
+
+    monkeypatch.setattr("manipose_mj.assets.catalogue.is_built", lambda *name: False)
+    before = workers()
+    assert load_objects(["mug_000"], 2)[0].name == "mug_000"
+    assert before.isdisjoint(workers())

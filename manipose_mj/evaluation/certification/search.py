@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import joblib
 
 from manipose_mj.control.baseline import MAX_PLANS
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, worker_deaths
 from manipose_mj.evaluation.certification.certificates import Certificate, Certificates, Key
 from manipose_mj.evaluation.episode import run_episode
 from manipose_mj.evaluation.protocol.frozen import Protocol, load
@@ -78,7 +78,9 @@ def verify(
 def _in_parallel(starts: Iterator, jobs: int) -> Iterator[tuple[Key, Certificate | str]]:
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
         pool = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-        yield from pool(joblib.delayed(_outcome)(*start) for start in starts)
+        outcomes = pool(joblib.delayed(_outcome)(*start) for start in starts)
+    with worker_deaths("repeat the command"):
+        yield from outcomes
 
 
 def _outcome(
