@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from manipose_mj.actions.control_law import Arm, ControlLaw, Memory
 from manipose_mj.actions.tcp_solver import TcpSolver
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, brief
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING, Panda
 
 _NO_LAG = np.zeros(7)
@@ -83,13 +83,23 @@ def checked_action(mode: str, shape: tuple[int, ...], action: Any) -> Float[np.n
     Raises:
       InputError: It has another shape, or a value that is no finite number.
     """
-    try:
-        array = np.empty(0) if np.iscomplexobj(action) else np.asarray(action, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise InputError(
-            f"action has shape {array.shape} and values {array.ravel()[:8].tolist()}; "
-            f"{mode} expects {shape[0]} finite numbers"
-        )
+    array = real_array(action)
+    if array is None or array.shape != shape or not np.isfinite(array).all():
+        raise InputError(f"action {in_words(action)}; {mode} expects {shape[0]} finite numbers")
     return array
+
+
+def real_array(action: Any) -> np.ndarray | None:
+    """The action as an array of real numbers, if it is one."""
+    try:
+        return None if np.iscomplexobj(action) else np.asarray(action, float)
+    except (TypeError, ValueError):
+        return None
+
+
+def in_words(action: Any) -> str:
+    """What an action is, in words that follow "action" in an error."""
+    array = real_array(action)
+    if array is None:
+        return f"is {brief(action)}, which is no array of real numbers"
+    return f"has shape {array.shape} and values {array.ravel()[:8].tolist()}"

@@ -9,7 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from manipose_mj.actions import CONTROL_MODES, TcpSolver, action_towards, control_mode
+from manipose_mj.actions import (
+    CONTROL_MODES,
+    TcpSolver,
+    action_towards,
+    checked_action,
+    control_mode,
+)
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import tcp_pose
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING, POSITION_LIMITS
@@ -39,6 +45,23 @@ def test_spec(name):
         np.testing.assert_array_equal(spec.minimum[:7], LOW)
         np.testing.assert_array_equal(spec.maximum[7:14], np.ones(7))
     spec.validate((spec.minimum + spec.maximum) / 2)
+
+
+@pytest.mark.usefixtures("wrong_arrays")
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        (np.zeros(2) + 0j, "is array([0.+0.j, 0.+0.j]), which is no array of real numbers"),
+        (["a", "b"], "is ['a', 'b'], which is no array of real numbers"),
+        ([[1.0], [1.0, 2.0]], "is [[1.0], [1.0, 2.0]], which is no array of real numbers"),
+        ([1.0], "has shape (1,) and values [1.0]"),
+        ([1.0, float("nan")], "has shape (2,) and values [1.0, nan]"),
+    ],
+)
+def test_a_wrong_action_is_told_as_what_it_is(action, said):
+    with pytest.raises(InputError) as refusal:
+        checked_action("pd_joint_pos", (2,), action)
+    assert str(refusal.value) == f"action {said}; pd_joint_pos expects 2 finite numbers"
 
 
 @pytest.mark.parametrize("name", SIZES)

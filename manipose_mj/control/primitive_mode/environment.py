@@ -13,6 +13,7 @@ from dm_control import mjcf
 from dm_env import specs
 from jaxtyping import Float
 
+from manipose_mj.actions.control_mode import in_words, real_array
 from manipose_mj.control.execution.executor import Executor
 from manipose_mj.control.motion.arm_model import ArmModel
 from manipose_mj.control.motion.motion_planner import MotionPlanner
@@ -245,14 +246,11 @@ def _checked(action: Any) -> tuple[str, Float[np.ndarray, "4 4"]]:
     Raises:
       InputError: The action is something else than eight finite numbers, or has no rotation.
     """
-    try:
-        array = np.asarray(action, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (8,) or not np.isfinite(array).all() or not array[4:].any():
+    array = real_array(action)
+    if array is None or array.shape != (8,) or not np.isfinite(array).all() or not array[4:].any():
         raise InputError(
-            f"action has shape {array.shape} and values {array.ravel()[:8].tolist()}; primitive expects "
-            "8 finite numbers: which primitive, x, y, z and a quaternion that is not zero"
+            f"action {in_words(action)}; primitive expects 8 finite numbers: "
+            "which primitive, x, y, z and a quaternion that is not zero"
         )
     index = round(float(np.clip(array[0], 0, len(PRIMITIVES) - 1)))
     return PRIMITIVES[index], vector_to_pose(array[1:])

@@ -173,7 +173,14 @@ def test_an_episode_ends_with_the_tasks_horizon(primitives, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "action", [np.zeros(7), np.full(8, np.nan), "up", np.array([0, 0.4, 0, 0.3, 0, 0, 0, 0])]
+    "action",
+    [
+        np.zeros(7),
+        np.full(8, np.nan),
+        "up",
+        np.array([0, 0.4, 0, 0.3, 0, 0, 0, 0]),
+        np.array([0, 0.4, 0, 0.3, 0, 1, 0, 0]) + 0j,
+    ],
 )
 def test_bad_actions_are_refused_in_one_line(primitives, action):
     with pytest.raises(InputError, match="primitive expects 8 finite numbers") as refused:
