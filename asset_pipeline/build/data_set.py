@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import logging
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
@@ -35,6 +36,7 @@ from manipose_mj.assets.asset_json import read_asset
 from manipose_mj.assets.geometry import Body, MassProperties, Shape
 from manipose_mj.assets.label import ObjectType
 from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.storage.staging import made_for_result
 
 log = logging.getLogger(__name__)
 
@@ -106,24 +108,24 @@ def build(
             raise unknown_name(f"object in {path}", name, found)
     for remark in said.remarks() if said is not None else ():
         log.warning("%s: %s", path, remark)
-    require_writable(out)
-    overrides = _overrides(labels, out, found)
-    return run_jobs(
-        [
-            BuildJob(
-                name=name,
-                folder=out / name,
-                where=found[name].where,
-                build=build_item,
-                arguments=(source, found[name], overrides.get(name)),
-                limits=limits,
-                sources=found[name].files,
-            )
-            for name in (sorted(set(only)) or sorted(found))
-        ],
-        jobs=jobs,
-        progress=progress,
-    )
+    with writable(out):
+        overrides = _overrides(labels, out, found)
+        return run_jobs(
+            [
+                BuildJob(
+                    name=name,
+                    folder=out / name,
+                    where=found[name].where,
+                    build=build_item,
+                    arguments=(source, found[name], overrides.get(name)),
+                    limits=limits,
+                    sources=found[name].files,
+                )
+                for name in (sorted(set(only)) or sorted(found))
+            ],
+            jobs=jobs,
+            progress=progress,
+        )
 
 
 def build_item(
@@ -302,18 +304,21 @@ def _is_whole(asset: Asset) -> bool:
     return all((asset.folder / file).is_file() for file in files)
 
 
-def require_writable(out: Path) -> None:
-    """Make the folder.
+@contextmanager
+def writable(out: Path) -> Iterator[None]:
+    """Make a folder, as `made_for_result`.
 
     Raises:
       InputError: It cannot be written.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=out):
-            pass
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror})") from None
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(made_for_result(out))
+            with tempfile.NamedTemporaryFile(dir=out):
+                pass
+        except OSError as error:
+            raise InputError(f"{out}: cannot be written ({error.strerror})") from None
+        yield
 
 
 def _overrides(labels: Path | None, out: Path, found: dict[str, ScanItem]) -> dict[str, Override]:

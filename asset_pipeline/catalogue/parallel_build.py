@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from asset_pipeline.build.data_set import require_writable, up_to_date
+from asset_pipeline.build.data_set import up_to_date, writable
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
 from asset_pipeline.build.replaceable import check_source
 from asset_pipeline.catalogue import instance
@@ -51,22 +51,22 @@ def build_catalogue(
     chosen = _chosen(entries, only)
     if out is not None:
         out = Path(out).absolute()
-    require_writable(catalogue.cache_folder("mug").parent if out is None else out)
-    return run_jobs(
-        [
-            BuildJob(
-                name=name,
-                folder=catalogue.cached(category, index) if out is None else out / name,
-                where=CATALOGUE[category].module,
-                build=build_instance,
-                arguments=(category, index, catalogue.code_hash(category)),
-                limits=None,
-            )
-            for name, (category, index) in chosen.items()
-        ],
-        jobs=jobs,
-        progress=progress,
-    )
+    with writable(catalogue.cache_folder("mug").parent if out is None else out):
+        return run_jobs(
+            [
+                BuildJob(
+                    name=name,
+                    folder=catalogue.cached(category, index) if out is None else out / name,
+                    where=CATALOGUE[category].module,
+                    build=build_instance,
+                    arguments=(category, index, catalogue.code_hash(category)),
+                    limits=None,
+                )
+                for name, (category, index) in chosen.items()
+            ],
+            jobs=jobs,
+            progress=progress,
+        )
 
 
 def build_instance(category: str, index: int, code: str, folder: Path, target: Path) -> bool:

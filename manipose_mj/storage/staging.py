@@ -54,14 +54,13 @@ def made_for_result(folder: Path) -> Iterator[None]:
       OSError: It cannot be made.
     """
     new = [each for each in (folder, *folder.parents) if not each.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         yield
-    except BaseException:
+    finally:
         for each in new:
             with contextlib.suppress(OSError):  # something is in it
                 each.rmdir()
-        raise
 
 
 def clear_staging(parent: Path) -> None:

@@ -177,14 +177,13 @@ def test_check_of_an_unreadable_asset_names_file_and_field(tmp_path: Path, capsy
 
 
 def test_build_of_a_truncated_archive_is_one_line(tmp_path: Path, capsys) -> None:
-    archive = tmp_path / "006_mustard_bottle_google_16k.tgz"
+    archive, out = tmp_path / "006_mustard_bottle_google_16k.tgz", tmp_path / "new" / "out"
     archive.write_bytes(b"\x1f\x8b\x08\x00" + bytes(30))
-    code = main(
-        ["assets", "build", "ycb", str(tmp_path), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    )
+    code = main(["assets", "build", "ycb", str(tmp_path), "--out", str(out), "--jobs", "1"])
     error = capsys.readouterr().err
     assert code == 2
     assert archive.name in error and len(error.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == [archive]
 
 
 @pytest.mark.usefixtures("fake_episodes")

@@ -215,6 +215,13 @@ def test_catalogue_builds_skips_and_survives_a_generator_that_fails(tmp_path, mo
     assert {f for f in before if before[f] != after[f]} == {"box_003/asset.json"}
 
 
+def test_a_catalogue_of_which_nothing_is_built_leaves_no_new_folder(tmp_path, monkeypatch):
+    missing = catalogue.Category("unwritten", "mirror", "none", (0.1, 0.2), 5)
+    monkeypatch.setitem(catalogue.CATALOGUE, "unwritten", missing)
+    (result,) = build_catalogue(tmp_path / "new" / "out", only=["unwritten_001"])
+    assert result.status == "failed" and not list(tmp_path.iterdir())
+
+
 def test_catalogue_fills_the_cache_that_load_reads(tmp_path, monkeypatch):
     monkeypatch.setenv(catalogue.CACHE_VARIABLE, str(tmp_path))
     (result,) = build_catalogue(only=["box_002"])
