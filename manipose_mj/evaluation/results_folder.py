@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, WorkerDiedError
 from manipose_mj.evaluation.records import EpisodeResult, read_results, to_line
 from manipose_mj.policies.loading import telling
 
@@ -28,7 +28,8 @@ logger = logging.getLogger(__name__)
 def results_file(out: Path) -> Iterator[IO[bytes]]:
     """The open and locked results file; a disk that refuses becomes an `InputError`.
 
-    One that ends the evaluation before its first result leaves no file behind, nor the folder if it is new.
+    What ends the evaluation before its first result leaves no file behind, nor the folder if it is new; but what can be
+    resumed stays.
     """
     new = not out.exists()
     try:
@@ -42,6 +43,8 @@ def results_file(out: Path) -> Iterator[IO[bytes]]:
             lock(file, out, "evaluation")
             try:
                 yield file
+            except WorkerDiedError:  # its advice is to resume
+                raise
             except BaseException:
                 _remove_if_empty(file, out, new)
                 raise
