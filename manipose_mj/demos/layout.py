@@ -246,7 +246,9 @@ def find_sets(path: Path) -> list[DemoSet]:
     Raises:
       InputError: There is none, or a file is broken.
     """
-    if path.is_file() or path.suffix == ".h5":
+    if path.is_file() and path.suffix != ".h5":
+        raise InputError(f"{path}: expected a folder of demonstrations, or a file trajectory.*.h5")
+    if path.suffix == ".h5" and not path.is_dir():
         return [_playable(read_set(path))]
     files = sorted([*path.glob("trajectory.*.h5"), *path.glob("*/trajectory.*.h5")])
     if not files:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.demos.layout import RECORDED_HZ, DemoEpisode, DemoSet, find_sets, read_actions
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, brief
 from manipose_mj.policies.protocol import ActionSpace
 
 ABSOLUTE = (
@@ -26,29 +26,43 @@ class RecordedPolicy:
         """Reads the descriptions of the recordings in a folder, or of one file.
 
         Raises:
-          InputError: There are none, or one is broken.
+          InputError: There are none, one is broken, or two hold an episode in the same control mode.
         """
-        self._episodes: dict[tuple[str, int], tuple[DemoSet, DemoEpisode]] = {}
+        self._episodes: dict[tuple[str, int], dict[str, tuple[DemoSet, DemoEpisode]]] = {}
         for demos in find_sets(Path(data)):
             for episode in demos.episodes:
-                self._episodes[demos.task, episode.episode_seed] = demos, episode
+                modes = self._episodes.setdefault((demos.task, episode.episode_seed), {})
+                if episode.control_mode in modes:
+                    raise InputError(
+                        f"{demos.path} and {modes[episode.control_mode][0].path} both hold seed {episode.episode_seed} "
+                        f"in {episode.control_mode}; name one of the files"
+                    )
+                modes[episode.control_mode] = demos, episode
         self._actions = np.zeros((0, 8))
 
     def reset(self, *, task: str, instruction: str, seed: int, action_space: ActionSpace) -> None:
         """Look the episode up.
 
         Raises:
-          InputError: It was not recorded, or in another control mode, or its actions are changes at another rate.
+          InputError: It was not recorded, or in other control modes, with another object, or its actions are changes at
+            another rate.
         """
         if (task, seed) not in self._episodes:
             raise InputError(
                 f"no recording of {task} with seed {seed}; record with the same --seed"
             )
-        demos, episode = self._episodes[task, seed]
-        if episode.control_mode != action_space.control_mode:
+        modes = self._episodes[task, seed]
+        if action_space.control_mode not in modes:
+            path = next(iter(modes.values()))[0].path
             raise InputError(
-                f"{demos.path}: its actions are {episode.control_mode}; "
-                f"add --control-mode {episode.control_mode}"
+                f"{path}: its actions are {' or '.join(modes)}; add --control-mode {next(iter(modes))}"
+            )
+        demos, episode = modes[action_space.control_mode]
+        if instruction != episode.instruction:
+            objects = " ".join(demos.env_kwargs.get("objects") or ())
+            raise InputError(
+                f"{demos.path}: seed {seed} was recorded with {episode.object} ({episode.instruction!r}), this episode asks "
+                f"{instruction!r}; expected {f'--objects {brief(objects)}' if objects else 'no --objects'}, as recorded"
             )
         if episode.control_mode not in ABSOLUTE and action_space.hz != RECORDED_HZ:
             raise InputError(

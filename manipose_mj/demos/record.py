@@ -25,7 +25,7 @@ from manipose_mj.demos.layout import (
     write_description,
     writing,
 )
-from manipose_mj.errors import InputError, worker_deaths
+from manipose_mj.errors import InputError, brief, worker_deaths
 from manipose_mj.evaluation.config import episode_seed
 from manipose_mj.evaluation.protocol.own_assets import digest_of_objects
 from manipose_mj.evaluation.records import write_atomically
@@ -232,7 +232,11 @@ def _recorded(config: RecordConfig, resume: bool) -> DemoSet:
             f"{config.path}: holds {wins} successes; add --resume for more, or choose another --out"
         )
     if demos.env_kwargs["objects"] != config.stated_objects:
-        raise InputError(f"{config.path}: its objects are others; choose another --out")
+        before, now = (brief(each) for each in (demos.env_kwargs["objects"], config.stated_objects))
+        raise InputError(
+            f"{config.path}: its objects are {before}, this run has {now}; resume with the same, in their order, or "
+            "choose another --out"
+        )
     if demos.assets_sha256 != digest:
         raise InputError(f"{config.path}: its objects were built otherwise; choose another --out")
     attempts = islice(config.seeds(), (_PATIENCE + 1) * (wins + 2))

@@ -72,6 +72,10 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         """
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
+        if "autoreset_mode" in config:
+            raise InputError(
+                "autoreset_mode is no option of an environment; with a vectorization_mode it goes into vector_kwargs"
+            )
         spec = task if isinstance(task, TaskSpec) else named_task(task)
         # The specification, not its name: a process that loads a pickled environment registers the task.
         own = {"render_mode": render_mode, "camera": camera, "height": height, "width": width}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -156,11 +157,39 @@ def test_changes_of_targets_are_played_at_their_rate_only(copied):
     description.write_text(description.read_text().replace("pd_joint_pos", "pd_ee_delta_pose"))
     policy, (episode, *_) = RecordedPolicy(str(copied)), read_set(copied).episodes
     space = ActionSpace(-np.ones(7), np.ones(7), "pd_ee_delta_pose", 10.0)
-    told = {"task": TASK, "instruction": "", "seed": episode.episode_seed}
+    told = {"task": TASK, "instruction": episode.instruction, "seed": episode.episode_seed}
     with pytest.raises(InputError, match="none can be left out: add --hz 50"):
         policy.reset(**told, action_space=space)
     policy.reset(**told, action_space=replace(space, hz=50.0))
     assert len(policy.infer({})["actions"]) == episode.elapsed_steps
+
+
+def test_recordings_are_played_on_their_objects_only(copied):
+    policy, (episode, *_) = RecordedPolicy(str(copied)), read_set(copied).episodes
+    told = {"task": TASK, "seed": episode.episode_seed}
+    space = ActionSpace(-np.ones(8), np.ones(8), "pd_joint_pos", 50.0)
+    policy.reset(**told, instruction=episode.instruction, action_space=space)
+    said = f"recorded with {episode.object} .* this episode asks 'Put the pan down'; expected --objects '{OBJECTS[0]}"
+    with pytest.raises(InputError, match=said):
+        policy.reset(**told, instruction="Put the pan down", action_space=space)
+
+
+def test_recordings_in_several_control_modes_are_told_apart(copied):
+    other = copied.with_name("trajectory.state.pd_ee_delta_pose.h5")
+    text = copied.with_suffix(".json").read_text()
+    other.with_suffix(".json").write_text(text.replace("pd_joint_pos", "pd_ee_delta_pose"))
+    shutil.copy(copied, other)
+    copied = copied.rename(copied.with_name("trajectory.state.pd_joint_pos.h5"))
+    copied.with_suffix(".json").write_text(text)
+    policy, (episode, *_) = RecordedPolicy(str(other.parent)), read_set(copied).episodes
+    told = {"task": TASK, "seed": episode.episode_seed, "instruction": episode.instruction}
+    for mode in ("pd_joint_pos", "pd_ee_delta_pose"):
+        policy.reset(**told, action_space=ActionSpace(-np.ones(8), np.ones(8), mode, 50.0))
+    with pytest.raises(InputError, match="its actions are .* or pd_"):
+        policy.reset(**told, action_space=ActionSpace(-np.ones(8), np.ones(8), "pd_ee_pose", 50.0))
+    other.with_suffix(".json").write_text(text)
+    with pytest.raises(InputError, match="both hold seed .* in pd_joint_pos; name one"):
+        RecordedPolicy(str(other.parent))
 
 
 def test_recordings_name_folders_of_objects_by_their_whole_path(tmp_path, monkeypatch):

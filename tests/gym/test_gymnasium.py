@@ -167,6 +167,7 @@ def test_one_environment_needs_no_worker():
         ({"num_envs": 1.5}, "num_envs is 1.5; expected a whole number"),
         ({"max_episode_steps": 0}, "max_episode_steps is 0"),
         ({"autoreset_mode": "later"}, "unknown autoreset mode 'later'.*SameStep"),
+        ({"vectorization_mode": "sync", "autoreset_mode": "SameStep"}, "goes into vector_kwargs"),
     ):
         with pytest.raises(InputError, match=said):
             gymnasium.make_vec(ID, **options)
