@@ -18,11 +18,11 @@ as it was measured. Lengths in metres, vectors in the mesh frame (the frame of t
         turn: [0, 0, 2.5]               # [deg] about the label's own X, then Y, then Z
         shift: [0.004, 0, 0]            # [m] along the label's X, Y, Z before the turn
 
-    microwave_7167:
+    "7167":                             # a name in digits, in quotes
       parts:
-        link_0:                         # a moving part, by the name of its body
-          handle: {origin: [-0.2, 0.1, 0.15], x: [0, 0, 1], y: [-1, 0, 0]}
-          joint: {origin: [-0.2, -0.2, 0], axis: [0, 0, 1]}   # positive is opening
+        door_0:                         # a moving part, by the name of its body; `manipose assets show` prints them
+          handle: {origin: [-0.195, -0.12, 0.15], x: [0, 0, 1], y: [-1, 0, 0]}
+          joint: {origin: [-0.138, 0.228, 0], axis: [0, 0, -1]}   # positive is opening
 
 A handle that was not found has `extents` as well: its lengths along X, Y, Z [m]. Beside these: `rotation`, three rows of three numbers whose columns are the label's X, Y, Z, instead of `x`
 and `y`; and `up`, the object's upright direction, from which the label is measured again.

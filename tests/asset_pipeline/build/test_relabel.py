@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +23,10 @@ from asset_pipeline.labelling.overrides.reading import read_overrides
 from asset_pipeline.sources.meshes import MeshOptions
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import read_asset
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
+from tests.asset_pipeline.sources.valid_files import valid
+from tests.places import ROOT
 
 
 def _labels(folder: Path, text: str) -> Path:
@@ -99,3 +103,25 @@ def test_a_build_that_measures_as_told_counts_the_print(tmp_path):
     assert result.status == "built", result.reason
     label = read_asset(result.folder).label
     assert len(label.symmetry.rotations) == len(label.symmetry_textured.rotations) == 4
+
+
+def test_the_documented_entry_relabels_a_door_by_the_name_that_show_prints(tmp_path, capsys):
+    pages = {path.replace("4711", "7167"): data for path, data in valid("partnet_mobility").items()}
+    for path in ("dataset/7167/mobility.urdf", "dataset/7167/semantics.txt"):  # the door's is 0
+        text = pages[path].decode().replace("link_0", "body").replace("link_1", "link_0")
+        pages[path] = (
+            text.replace("body", "link_1").replace("furniture_link_1", "furniture_body").encode()
+        )
+    del pages["dataset/7167/mobility_v2.json"]
+    (result,) = build(
+        "partnet_mobility", files.write_folder(tmp_path / "raw", pages), tmp_path / "out"
+    )
+    assert result.status == "built", result.reason
+    page = (ROOT / "docs" / "guides" / "label_corrections.md").read_text(encoding="utf-8")
+    (entry,) = re.findall(r'```yaml\n.*?(^"7167":.*?)```', page, re.DOTALL | re.MULTILINE)
+    (after,) = relabel(tmp_path / "out", _labels(tmp_path, entry))
+    (door,) = after.parts
+    np.testing.assert_allclose(door.handle.extents, [0.2, 0.03, 0.02])
+    np.testing.assert_allclose(door.joint.axis, [0, 0, -1])
+    assert main(["assets", "show", str(after.folder)]) == 0
+    assert "part door_0" in capsys.readouterr().out
