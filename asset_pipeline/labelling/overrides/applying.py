@@ -20,7 +20,8 @@ from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
-_FARTHEST = 3  # from the middle of an object its label's origin can be, in lengths of its diagonal
+# In lengths of an object's diagonal: from its middle its label's origin, from its box a handle or a hinge can be.
+_FARTHEST = 3
 _DENSEST = 22_600.0  # of all matter: osmium [kg/m^3]
 _LIGHTEST = 1.2  # air
 
@@ -72,6 +73,7 @@ def overridden(
     found, quality = _measured(asset, override, surface, category, up, textured, texture)
     label = _moved(found, override.frame, override.where)
     _check_units(override, label, surface)
+    parts = tuple(_part(override, part, surface) for part in asset.parts)
     if label is not found:
         quality = None  # a person's word
     if label is not asset.label:
@@ -85,7 +87,7 @@ def overridden(
         label=label,
         label_quality=quality,
         mass_properties=_weighed(asset.mass_properties, override.mass),
-        parts=tuple(_part(override, part) for part in asset.parts),
+        parts=parts,
         areas=tuple(_area(area, asset.label, label) for area in asset.areas),
     )
 
@@ -110,6 +112,31 @@ def _check_units(override: Override, label: PoseLabel, surface: trimesh.Trimesh)
             raise InputError(
                 f"{override.where}: mass {override.mass:g} kg is {what} of that size weighs; expected kilograms"
             )
+
+
+def _check_near(
+    point: Float[np.ndarray, "3"],
+    surface: trimesh.Trimesh,
+    where: str,
+) -> None:
+    """Raise `InputError` for a part's point in millimetres."""
+    low, high = surface.bounds
+    size = float(np.linalg.norm(high - low))
+    away = float(np.linalg.norm(point - np.clip(point, low, high)))
+    if away > _FARTHEST * size:
+        raise InputError(
+            f"{where}: is {away:.3g} m from an object of {size:.3g} m; expected metres"
+        )
+
+
+def _check_length(extents: Float[np.ndarray, "3"], surface: trimesh.Trimesh, where: str) -> None:
+    """Raise `InputError` for a handle's lengths in millimetres."""
+    size = float(np.linalg.norm(np.ptp(surface.bounds, axis=0)))
+    longest = float(extents.max())
+    if longest > size:
+        raise InputError(
+            f"{where}: reach {longest:.3g} m along an object of {size:.3g} m; expected metres"
+        )
 
 
 def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
@@ -192,15 +219,19 @@ def _measured(
         raise InputError(f"{override.where}: cannot be measured as told ({error})") from None
 
 
-def _part(override: Override, part: MovingPart) -> MovingPart:
+def _part(override: Override, part: MovingPart, surface: trimesh.Trimesh) -> MovingPart:
     said: PartOverride | None = override.parts.get(part.name)
     if said is None:
         return part
     handle, joint = part.handle, part.joint
+    where = f"{override.where}: parts: {part.name}"
     if said.handle is not None:
         found = handle or _new_handle(override, part.name, said.handle)
-        handle = _moved(found, said.handle, f"{override.where}: parts: {part.name}: handle")
+        handle = _moved(found, said.handle, f"{where}: handle")
+        _check_near(handle.origin, surface, f"{where}: handle: origin")
+        _check_length(handle.extents, surface, f"{where}: handle: extents")
     if said.joint_origin is not None:
+        _check_near(said.joint_origin, surface, f"{where}: joint: origin")
         joint = replace(joint, origin=said.joint_origin)
     if said.joint_axis is not None:
         joint = replace(joint, axis=said.joint_axis)

@@ -125,3 +125,21 @@ def test_the_documented_entry_relabels_a_door_by_the_name_that_show_prints(tmp_p
     np.testing.assert_allclose(door.joint.axis, [0, 0, -1])
     assert main(["assets", "show", str(after.folder)]) == 0
     assert "part door_0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("joint: {origin: [500, -200, 0]}", "joint: origin: is 538 m from an object of 0.213 m"),
+        ("handle: {origin: [-30, 0, 100]}", "handle: origin: is 104 m from an object of 0.213 m"),
+        ("handle: {extents: [100, 20, 10]}", "handle: extents: reach 100 m along an object of"),
+        ("handle: {adjust: {shift: [20, 0, 0]}}", "handle: origin: is 20 m from an object of"),
+    ],
+)
+def test_millimetres_of_parts_are_told_before_anything_is_written(tmp_path, entry, message):
+    asset = made.cupboard(tmp_path / "cupboard")
+    before = {path: path.read_bytes() for path in asset.folder.rglob("*") if path.is_file()}
+    labels = _labels(tmp_path, f"cupboard: {{parts: {{drawer: {{{entry}}}}}}}\n")
+    with pytest.raises(InputError, match=f"cupboard: parts: drawer: {message}.*; expected metres"):
+        relabel(asset.folder, labels)
+    assert {p: p.read_bytes() for p in asset.folder.rglob("*") if p.is_file()} == before
