@@ -20,6 +20,7 @@ from asset_pipeline.build.relabel import MEASURED_FILE, OVERRIDE, relabelled, wr
 from asset_pipeline.build.replaceable import PLACE, check_origin, check_source, place
 from asset_pipeline.build.rigid import box_center, finish_rigid
 from asset_pipeline.build.workers.limited_call import LimitError, Limits, limited_call
+from asset_pipeline.checks.handle_check import handle_remarks
 from asset_pipeline.geometry.convexify import ConvexSettings, convexify
 from asset_pipeline.geometry.mass import shell_mass_properties, solid_mass_properties
 from asset_pipeline.geometry.repair import closed
@@ -151,7 +152,9 @@ def build_item(
             provenance = replace(provenance, generator=generator())
             asset = build_articulated(replace(scan, provenance=provenance), target)
             if override is not None:
-                relabelled(asset, override)
+                asset = relabelled(asset, override)
+            for remark in handle_remarks(asset):
+                log.warning("%s: %s", scan.name, remark)
         else:
             if isinstance(item, MeshItem):
                 where = {PLACE: place(item.file, folder)}

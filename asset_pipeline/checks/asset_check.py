@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from joblib import Parallel, delayed
 
 from asset_pipeline.checks.agreement_check import body_failures, joint_failures
+from asset_pipeline.checks.handle_check import handle_remarks
 from asset_pipeline.checks.visual_check import visual_failures
 from asset_pipeline.geometry.settling import SETTLE_TIME, dropped, speeds
 from asset_pipeline.geometry.stable_poses import tilt
@@ -63,6 +65,7 @@ class CheckResult:
       parts: Number of collision geoms.
       part_vertices: Most vertices of a collision mesh.
       grasps: Number of sampled grasps.
+      remarks: One line for each thing that tasks may refuse it for; no failure.
     """
 
     name: str
@@ -73,6 +76,7 @@ class CheckResult:
     parts: int = 0
     part_vertices: int = 0
     grasps: int = 0
+    remarks: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -124,14 +128,15 @@ def check_asset(folder: Path) -> CheckResult:
         return CheckResult(folder.name, (f"{folder}: model.xml does not compile: {line}",))
     checked = _check_articulated if asset.kind == "articulated" else _check_rigid
     result = checked(asset, model)
-    return replace(result, failures=(*result.failures, *body_failures(asset, model), *unlike))
+    failures = (*result.failures, *body_failures(asset, model), *unlike)
+    return replace(result, failures=failures, remarks=handle_remarks(asset))
 
 
 def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
     failures = _shape_failures(model)
     parts, vertices = _collision_parts(model)
     grasps = 0 if asset.grasps is None else len(asset.grasps)
-    counts = {"parts": parts, "part_vertices": vertices, "grasps": grasps}
+    counts: dict[str, Any] = {"parts": parts, "part_vertices": vertices, "grasps": grasps}
     if model.nq != 7:
         failures.append(f"model has {model.nq} coordinates; a rigid asset has one free joint")
     if not asset.stable_poses:
@@ -161,7 +166,7 @@ def _check_rigid(asset: Asset, model: mujoco.MjModel) -> CheckResult:
 def _check_articulated(asset: Asset, model: mujoco.MjModel) -> CheckResult:
     failures = _shape_failures(model)
     parts, vertices = _collision_parts(model)
-    counts = {"parts": parts, "part_vertices": vertices, "grasps": 0}
+    counts: dict[str, Any] = {"parts": parts, "part_vertices": vertices, "grasps": 0}
     if unlike := joint_failures(asset, model):  # what moves is then not what asset.json speaks of
         return CheckResult(asset.folder.name, (*failures, *unlike), **counts)
     data = mujoco.MjData(model)

@@ -62,6 +62,8 @@ def check_assets(
     for result in results:
         for reason in (unreadable[result.name],) if result.name in unreadable else result.failures:
             output.fail_line(reason if result.name in reason else f"{result.name}: {reason}")
+        for remark in result.remarks:
+            console.print(f"{result.name}: {remark}", soft_wrap=True, highlight=False, markup=False)
     return 2 if unreadable else int(not all(r.ok for r in results))
 
 

@@ -105,26 +105,46 @@ def test_a_build_that_measures_as_told_counts_the_print(tmp_path):
     assert len(label.symmetry.rotations) == len(label.symmetry_textured.rotations) == 4
 
 
-def test_the_documented_entry_relabels_a_door_by_the_name_that_show_prints(tmp_path, capsys):
-    pages = {path.replace("4711", "7167"): data for path, data in valid("partnet_mobility").items()}
-    for path in ("dataset/7167/mobility.urdf", "dataset/7167/semantics.txt"):  # the door's is 0
-        text = pages[path].decode().replace("link_0", "body").replace("link_1", "link_0")
-        pages[path] = (
-            text.replace("body", "link_1").replace("furniture_link_1", "furniture_body").encode()
-        )
-    del pages["dataset/7167/mobility_v2.json"]
-    (result,) = build(
-        "partnet_mobility", files.write_folder(tmp_path / "raw", pages), tmp_path / "out"
-    )
-    assert result.status == "built", result.reason
+def _furniture(folder: Path) -> Path:
+    """A piece called 7167 whose door, which has no handle, is its link 0."""
+    home = "dataset/7167/"
+    drawn = valid("partnet_mobility").items()
+    content = {path.replace("dataset/4711/", home): data for path, data in drawn}
+    for path in (home + "mobility.urdf", home + "semantics.txt"):
+        text = content[path].decode()
+        text = re.sub(r"link_([01])", lambda m: f"link_{1 - int(m[1])}", text)
+        content[path] = text.encode()
+    del content[home + "mobility_v2.json"]
+    return files.write_folder(folder, content)
+
+
+def _documented_entry() -> str:
     page = (ROOT / "docs" / "guides" / "label_corrections.md").read_text(encoding="utf-8")
     (entry,) = re.findall(r'```yaml\n.*?(^"7167":.*?)```', page, re.DOTALL | re.MULTILINE)
-    (after,) = relabel(tmp_path / "out", _labels(tmp_path, entry))
+    return entry
+
+
+def test_the_documented_entry_relabels_a_door_by_the_name_that_show_prints(tmp_path, capsys):
+    (result,) = build("partnet_mobility", _furniture(tmp_path / "raw"), tmp_path / "out")
+    assert result.status == "built", result.reason
+    (after,) = relabel(tmp_path / "out", _labels(tmp_path, _documented_entry()))
     (door,) = after.parts
     np.testing.assert_allclose(door.handle.extents, [0.2, 0.03, 0.02])
     np.testing.assert_allclose(door.joint.axis, [0, 0, -1])
     assert main(["assets", "show", str(after.folder)]) == 0
     assert "part door_0" in capsys.readouterr().out
+
+
+def test_a_build_warns_of_a_door_without_a_handle_unless_labels_bring_one(tmp_path, caplog):
+    raw, out = _furniture(tmp_path / "raw"), tmp_path / "out"
+    said = (
+        "7167: door_0: no handle found; tasks that open it refuse it; say `parts: door_0: handle:`"
+    )
+    build("partnet_mobility", raw, out)
+    assert caplog.text.count(f"{said} in labels.yaml") == 1
+    caplog.clear()
+    (result,) = build("partnet_mobility", raw, out, labels=_labels(tmp_path, _documented_entry()))
+    assert result.status == "built" and "no handle" not in caplog.text
 
 
 @pytest.mark.parametrize(

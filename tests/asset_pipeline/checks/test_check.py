@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import tests.asset_pipeline.labelled_assets as made
 from asset_pipeline.build.emit import write_asset
 from asset_pipeline.build.rigid import finish_rigid
 from asset_pipeline.checks.asset_check import check, check_asset
@@ -13,6 +14,7 @@ from asset_pipeline.geometry.mass import shape_mass_properties
 from manipose_mj.assets.asset import Asset, MovingPart, Provenance, StablePose
 from manipose_mj.assets.geometry import Body, Joint, MassProperties, Shape
 from manipose_mj.assets.label import PoseLabel
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 from manipose_mj.poses import SymmetryGroup, compose, rotation_about
 
@@ -146,3 +148,12 @@ def test_drawer_that_falls_open_or_is_blocked_fails(tmp_path, box):
     joint = Joint("slide", np.zeros(3), np.array([0.0, -1, 0]), (0.0, 0.15), 2.0, 5.0)
     blocked = _cabinet(tmp_path / "blocked", box, joint, blocked=True)
     assert any("opens to" in line for line in blocked.failures)
+
+
+def test_a_door_without_a_handle_is_a_remark_and_no_failure(tmp_path, capsys):
+    cupboard = made.cupboard(tmp_path / "cupboard")
+    remark = "door: no handle found; tasks that open it refuse it; say `parts: door: handle:`"
+    (said,) = check_asset(cupboard.folder).remarks
+    assert said.startswith(remark)
+    main(["assets", "check", str(cupboard.folder)])
+    assert f"cupboard: {remark} in labels.yaml" in capsys.readouterr().out
