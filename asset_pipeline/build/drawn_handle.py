@@ -21,6 +21,8 @@ LAYER = 0.004  # faces this near to each other in depth are one front [m]
 FRONT_SHARE = 0.15  # of the door's outline that a front covers
 CLEAR = 0.01  # in front of it a handle begins; what lies nearer is a frame [m]
 LEAST_DEPTH, LEAST_LENGTH = 0.015, 0.06  # of a handle [m]
+# A bar of less depth has at least this share of its face behind it too, and as much room there as LEAST_DEPTH.
+BACK_SHARE = 0.5
 SLENDER = 2.0  # times longer than wide, at least
 
 
@@ -44,7 +46,7 @@ def with_handle(link: ScanLink, outwards: Float[np.ndarray, "3"]) -> ScanLink:
             kept.append((part, _faces(surface, ~sticks_out)))
             cut.append(_faces(surface, sticks_out))
     handle = PartMesh(HANDLE, HANDLE, tuple(s for s in cut if len(s.mesh.faces)))
-    if not handle.surfaces or not _is_handle(handle.mesh, outwards):
+    if not handle.surfaces or not _is_handle(handle.mesh, outwards, front):
         return link
     rest = [
         replace(part, surfaces=own)
@@ -78,11 +80,22 @@ def _front(link: ScanLink, outwards: Float[np.ndarray, "3"]) -> float | None:
     )
 
 
-def _is_handle(mesh: trimesh.Trimesh, outwards: Float[np.ndarray, "3"]) -> bool:
+def _is_handle(mesh: trimesh.Trimesh, outwards: Float[np.ndarray, "3"], front: float) -> bool:
+    """Whether what sticks out beyond the depth `front` [m] is long, and deep or a bar."""
     extents = np.asarray(mesh.extents)
     across = np.sort(extents[outwards == 0])
-    depth = float(extents[outwards != 0][0])
-    return depth > LEAST_DEPTH and across[1] > max(LEAST_LENGTH, SLENDER * across[0])
+    if across[1] <= max(LEAST_LENGTH, SLENDER * across[0]):
+        return False
+    return float(extents[outwards != 0][0]) > LEAST_DEPTH or _is_bar(mesh, outwards, front)
+
+
+def _is_bar(mesh: trimesh.Trimesh, outwards: Float[np.ndarray, "3"], front: float) -> bool:
+    """Whether there is room between what sticks out and the front; behind mouldings and panels there is none."""
+    facing = np.asarray(mesh.face_normals) @ outwards
+    clear = np.asarray(mesh.triangles_center) @ outwards > front + LEAST_DEPTH
+    area = np.asarray(mesh.area_faces)
+    behind, before = area[(facing < -FACING) & clear].sum(), area[facing > FACING].sum()
+    return bool(behind > BACK_SHARE * before)
 
 
 def _faces(surface: Surface, which: Bool[np.ndarray, " f"]) -> Surface:

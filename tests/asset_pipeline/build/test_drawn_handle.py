@@ -12,6 +12,9 @@ PANEL = ((-0.33, -0.3, 0.2), (-0.30, 0.3, 0.7))
 BAR = ((-0.39, -0.25, 0.64), (-0.37, 0.25, 0.66))
 POSTS = [((-0.37, y, 0.645), (-0.33, y + 0.01, 0.655)) for y in (-0.2, 0.2)]
 FRAME = ((-0.336, -0.2, 0.3), (-0.33, 0.2, 0.5))
+THIN_BAR = ((-0.373, -0.25, 0.64), (-0.365, 0.25, 0.66))  # 8 mm, as far off the door as fingers go
+MOULDING = ((-0.348, -0.25, 0.64), (-0.330, 0.25, 0.66))  # before the door, without room behind
+SLAT = ((-0.345, -0.25, 0.64), (-0.341, 0.25, 0.66))  # too near to the door to be held
 KNOB = ((-0.36, -0.02, 0.6), (-0.345, 0.02, 0.64))
 
 
@@ -36,7 +39,13 @@ def test_a_bar_becomes_the_handle(tmp_path, textured):
         np.testing.assert_allclose(own.visual.uv, np.asarray(own.vertices)[:, 1:], atol=1e-9)
 
 
-@pytest.mark.parametrize("more", [(), (FRAME,), (KNOB,)])
+def test_a_thin_bar_is_a_handle_where_there_is_room_behind_it():
+    door, handle = with_handle(_door(PANEL, FRAME, *POSTS, THIN_BAR), OUT).parts
+    np.testing.assert_allclose(handle.mesh.bounds, THIN_BAR, atol=1e-9)
+    assert len(door.mesh.faces) + len(handle.mesh.faces) == 5 * 12
+
+
+@pytest.mark.parametrize("more", [(), (FRAME,), (KNOB,), (MOULDING,), (SLAT,)])
 def test_what_is_no_handle_leaves_the_door_as_it_was(more):
     door = _door(PANEL, *more)
     assert with_handle(door, OUT) is door
