@@ -20,6 +20,11 @@ from manipose_mj.assets.label import ObjectType, PoseLabel
 from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError
 
+# Tolerances in metres are those of scans of things of at least this diagonal [m] ...
+LEAST_DIAGONAL = 0.08
+# ... and of what is smaller, where it is so noisy, as a share of its diagonal: a scan, and no drawn shape.
+NOISY = 0.001
+
 
 def scan_label(
     mesh: trimesh.Trimesh,
@@ -35,7 +40,8 @@ def scan_label(
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
     The frame is measured: `axial_label`, `mirror_label` and `tool_label` say how, and what they do
-    where the rules leave something open.
+    where the rules leave something open. What is smaller than 8 cm and not noisy is labelled as if it were enlarged
+    to that: its symmetries do not depend on its size.
 
     Args:
       mesh: In the mesh frame [m].
@@ -60,6 +66,11 @@ def scan_label(
     if up is None and object_type != "functional":
         raise InputError(f"no up axis for an object of type {object_type!r}; only tools need none")
     cloud = SurfaceCloud.of(mesh)
+    colours = surface_colours(cloud, mesh, texture) if textured and texture is not None else None
+    small = cloud.diagonal < LEAST_DIAGONAL and cloud.noise < NOISY * cloud.diagonal
+    factor = LEAST_DIAGONAL / cloud.diagonal if small else 1.0
+    if small:
+        cloud = cloud.enlarged(factor)
     if up is None or object_type == "functional":
         label, quality = tool_label(cloud, category=category, functional=functional)
     else:
@@ -69,8 +80,16 @@ def scan_label(
             confidence = min(quality.confidence, axis_evidence(cloud, up))
             quality = replace(quality, confidence=confidence)
     if textured:
-        colours = None if texture is None else surface_colours(cloud, mesh, texture)
         label = replace(label, print_symmetry=print_symmetry(cloud, colours, label))
+    if small:
+        residuals = {name: value / factor for name, value in quality.residuals.items()}
+        quality = replace(quality, residuals=residuals)
+        label = replace(
+            label,
+            origin=label.origin / factor,
+            extents=label.extents / factor,
+            center=label.center / factor,
+        )
     return label, quality
 
 

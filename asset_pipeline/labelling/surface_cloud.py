@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -76,6 +76,17 @@ class SurfaceCloud:
     def thinned(self, count: int) -> slice:
         """Every so many points, `count` of them or a few more."""
         return slice(None, None, max(1, len(self.points) // count))
+
+    def enlarged(self, factor: float) -> SurfaceCloud:
+        """The same surface, all lengths times `factor`."""
+        points = factor * self.points
+        return replace(
+            self,
+            points=points,
+            noise=factor * self.noise,
+            diagonal=factor * self.diagonal,
+            tree=cKDTree(points),
+        )
 
     def box(
         self, rotation: Float[np.ndarray, "3 3"]

@@ -183,3 +183,42 @@ def test_the_label_does_not_depend_on_where_the_mesh_is():
     moved, _ = scan_label(there, "mirror", UP)
     between = Rotation.from_matrix(turn @ here.rotation @ moved.rotation.T).magnitude()
     assert np.rad2deg(between) < 0.5
+
+
+def _knob() -> trimesh.Trimesh:
+    """Cut flat along one side."""
+    whole = trimesh.creation.cylinder(0.006, 0.014, sections=48)
+    side = _block([-0.01, -0.01, -0.01], [0.0042, 0.01, 0.01])
+    return trimesh.boolean.intersection([whole, side])
+
+
+@pytest.mark.parametrize(
+    ("mesh", "object_type", "axial", "members"),
+    [
+        (trimesh.creation.box([0.012, 0.010, 0.008]), "mirror", False, 4),
+        (trimesh.creation.box([0.008, 0.008, 0.016]), "mirror", False, 8),
+        (trimesh.creation.box([0.008, 0.008, 0.008]), "mirror", False, 24),
+        (
+            trimesh.creation.revolve([(0, 0), (0.006, 0), (0.0045, 0.02), (0, 0.02)]),
+            "axial",
+            True,
+            1,
+        ),
+        (_knob(), "axial", False, 2),
+    ],
+)
+def test_symmetries_of_a_drawn_shape_do_not_depend_on_its_size(mesh, object_type, axial, members):
+    small, sure = scan_label(mesh, object_type, UP, textured=False)
+    assert small.symmetry.axial == axial and len(small.symmetry.rotations) == members
+    large, as_sure = scan_label(mesh.copy().apply_scale(10), object_type, UP, textured=False)
+    assert large.symmetry.axial == axial and len(large.symmetry.rotations) == members
+    np.testing.assert_allclose(10 * small.extents, large.extents, rtol=1e-3)
+    np.testing.assert_allclose(10 * small.origin, large.origin, atol=2e-4)
+    np.testing.assert_allclose(small.rotation[:, 0], large.rotation[:, 0], atol=1e-3)
+    for name, value in as_sure.residuals.items():
+        assert 10 * sure.residuals[name] == pytest.approx(value, abs=2e-4)
+
+
+def test_a_small_scan_keeps_the_symmetries_that_its_noise_hides():
+    label, _ = scan_label(_scan_of(_block([-0.01] * 3, [0.01] * 3), np.eye(3)), "mirror", UP)
+    assert len(label.symmetry.rotations) == 24
