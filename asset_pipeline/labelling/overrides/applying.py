@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.labelling.overrides.other_axes import symmetries_along
+from asset_pipeline.labelling.overrides.other_axes import require_on_axis, symmetries_along
 from asset_pipeline.labelling.overrides.reading import FrameOverride, Override, PartOverride
 from asset_pipeline.labelling.scan_label import scan_label
 from manipose_mj.assets.asset import Area, Asset, MovingPart
@@ -73,6 +73,8 @@ def overridden(
     found, quality = _measured(asset, override, surface, category, up, textured, texture)
     label = _moved(found, override.frame, override.where)
     _check_units(override, label, surface)
+    if override.frame.symmetry is None:
+        require_on_axis(found, label.origin, override.where)
     parts = tuple(_part(override, part, surface) for part in asset.parts)
     if label is not found:
         quality = None  # a person's word

@@ -12,6 +12,8 @@ from manipose_mj.poses import SymmetryGroup, rotation_angle
 
 # Axes that turn by no more were measured wrongly, and the symmetry about them with them [rad].
 CORRECTION = np.deg2rad(15.0)
+# How far an origin may lie off a measured axis of revolution: a share of the object's diagonal.
+OFF_AXIS = 0.03
 _RENAMINGS = SYMMETRIES["cube"].rotations  # the same three lines under other names
 
 
@@ -43,6 +45,27 @@ def symmetries_along(
         _in_axes(label.symmetry, settled),
         None if printed is None else _in_axes(printed, settled),
     )
+
+
+def require_on_axis(label: PoseLabel, origin: Float[np.ndarray, "3"], where: str) -> None:
+    """Refuse another origin off the axis of revolution that the label keeps.
+
+    Args:
+      label: As measured.
+      origin: `(3,)` [m], in the mesh frame.
+      where: Opens the message.
+
+    Raises:
+      InputError: It lies farther off than a correction does.
+    """
+    if not label.symmetry.axial:
+        return
+    away = float(np.linalg.norm(np.cross(origin - label.origin, label.rotation[:, 0])))
+    if away > OFF_AXIS * np.linalg.norm(label.extents):
+        raise InputError(
+            f"{where}: origin: lies {1000 * away:.0f} mm off the measured axis of revolution; "
+            "expected on it, or `symmetry: none`"
+        )
 
 
 def _without_correction(change: Float[np.ndarray, "3 3"], axial: bool) -> Float[np.ndarray, "3 3"]:

@@ -191,6 +191,13 @@ def test_an_axis_of_revolution_stays_x_unless_a_symmetry_is_said(tmp_path):
         told(**axes)
     assert "\n" not in str(no.value)
     assert symmetry_name(told(**axes, symmetry="half turn")) == "half turn"
+    off = {"origin": [0.03, 0, 0.1]}
+    with pytest.raises(InputError, match="block: origin: lies 30 mm off .*, or `symmetry: none`"):
+        told(**off)
+    with pytest.raises(InputError, match="block: origin: lies 30 mm off"):
+        told(adjust={"shift": [0.02, 0.03, 0]})
+    assert symmetry_name(told(**off, symmetry="none")) == "none"
+    assert symmetry_name(told(origin=[0.004, 0.002, 0.17])) == "axis and flip"
 
 
 def test_symmetry_names_are_of_closed_groups_and_told_apart():
