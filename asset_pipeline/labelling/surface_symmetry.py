@@ -41,6 +41,9 @@ ROUND = Tolerance(percentile=85.0, length=0.0016, share=0.025)
 # For things that are worn, bulged or badly scanned.
 WORN = Tolerance(percentile=95.0, length=0.0016, share=0.025)
 
+# Sixth turns leave at most this share of the strict limit: nearly round scans pass more turns than they have.
+SIXTH_SHARE = 0.5
+
 
 def residuals(
     cloud: SurfaceCloud,
@@ -113,8 +116,8 @@ def measured_symmetry(
 ) -> SymmetryGroup:
     """The proper rotations, among those a label can have, that map the shape onto itself.
 
-    Tried are every turn about the label's X, the flip, quarter turns and half turns about X, Y and Z.
-    What holds generates the group.
+    Tried are every turn about the label's X, the flip, quarter turns and half turns about X, Y and Z, and, where no
+    quarter turn holds, sixth turns about X. What holds generates the group.
 
     Args:
       cloud: The surface.
@@ -131,8 +134,20 @@ def measured_symmetry(
     if axial_residual(cloud, rotation[:, 0], origin, axial.percentile) <= axial.limit(cloud):
         return SymmetryGroup.about_x(ends_alike=held(np.diag([-1.0, 1.0, -1.0])))
     tried = [rotation_about(axis, angle) for angle in (np.pi / 2, np.pi) for axis in (x, y, z)]
-    members = [np.round(turn) for turn in tried if held(turn)]
+    kept = [held(turn) for turn in tried]
+    members = [np.round(turn) for turn, holding in zip(tried, kept, strict=True) if holding]
+    sixth = rotation_about(x, np.pi / 3)
+    if not any(kept[:3]) and _leaves_little(cloud, rotation @ sixth @ rotation.T, origin):
+        members.append(sixth)
     return SymmetryGroup.generated(np.stack(members)) if members else SymmetryGroup.identity()
+
+
+def _leaves_little(
+    cloud: SurfaceCloud, motion: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"]
+) -> bool:
+    """Whether the motion leaves as little as those of a drawn shape."""
+    limit = SIXTH_SHARE * STRICT.limit(cloud)
+    return residual(cloud, motion, center, STRICT.percentile) <= limit
 
 
 def turns_about_x(

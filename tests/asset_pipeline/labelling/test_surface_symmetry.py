@@ -98,6 +98,8 @@ def test_the_planes_of_a_box_are_found_from_any_start():
         (trimesh.creation.box(extents=[0.04, 0.06, 0.1]), False, 4),
         (trimesh.creation.box(extents=[0.06, 0.06, 0.1]), False, 8),
         (trimesh.creation.box(extents=[0.06, 0.06, 0.06]), False, 24),
+        (trimesh.creation.cylinder(0.03, 0.04, sections=6), False, 12),
+        (trimesh.creation.cone(0.03, 0.1, sections=6).apply_translation([0, 0, -0.05]), False, 6),
         (trimesh.creation.cylinder(0.03, 0.1), True, 2),
         (trimesh.creation.cone(0.03, 0.1).apply_translation([0, 0, -0.05]), True, 1),
     ],
