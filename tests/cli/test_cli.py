@@ -246,7 +246,7 @@ def test_demo_repeats_itself_and_spares_other_results(tmp_path: Path, capsys) ->
     before = (other / "results.jsonl").read_bytes()
     capsys.readouterr()
     assert main([*demo, str(other)]) == 2
-    assert "holds 2 results" in complaint(capsys)
+    assert "holds results that are not a demo's; choose another --out" in complaint(capsys)
     assert (other / "results.jsonl").read_bytes() == before
 
 
