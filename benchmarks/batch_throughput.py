@@ -16,6 +16,7 @@ import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -56,6 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--room", nargs=2, type=int, metavar=("CONTACTS", "ROWS"), help="of a world, of engine warp"
     )
     parser.add_argument("--resets", type=float, default=0.0, help="share of worlds reset a step")
+    parser.add_argument(
+        "--alone",
+        action="store_true",
+        help="also worlds of one object of the pool, in the same slots",
+    )
 
 
 def measure(task: str, arguments: argparse.Namespace) -> None:
@@ -143,7 +149,33 @@ def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) 
         f"{first:.1f}",
     )
     print("| " + " | ".join(map(str, values)) + " |", flush=True)
+    if arguments.alone:
+        _print_alone(worlds, roll, actions)
     worlds.close()
+
+
+def _print_alone(
+    worlds: batch.Worlds, roll: Callable[..., tuple[batch.State, Any]], actions: jax.Array
+) -> None:
+    """The rate of the mixture over that of each of its objects alone, all in turns."""
+    of_object: dict[str, list[int]] = {}
+    for start in worlds.pool.starts:
+        of_object.setdefault(start.object_name, []).append(start.seed)
+    states = {"all": worlds.reset(jax.random.key(0))}
+    for name, seeds in sorted(of_object.items()):
+        states[name] = worlds.at(np.resize(seeds, worlds.count).tolist())
+    states = {name: roll(state, actions)[0] for name, state in states.items()}
+    seconds: dict[str, list[float]] = {name: [] for name in states}
+    for _ in range(TURNS):
+        for name, state in states.items():
+            seconds[name].append(_timed(lambda state=state: roll(state, actions))[0])
+    medians = {name: statistics.median(each) for name, each in seconds.items()}
+    mixed = medians.pop("all")
+    for name, alone in medians.items():
+        rate = worlds.count * len(actions) / alone
+        print(f"{name} alone: {rate:,.0f} environment steps/s; mixed are {alone / mixed:.2f} of it")
+    mean = statistics.mean(medians.values())
+    print(f"mixed: {mean / mixed:.2f} of as many worlds of each, one object after the other")
 
 
 def _bare_c(
@@ -172,11 +204,17 @@ def _bare_c(
         for i, words in enumerate(np.asarray(state.simulation)):
             control[i, step] = data_of(words, listed[i]).ctrl
     control = np.repeat(control, substeps, axis=1)
-    datas = [mujoco.MjData(listed[0]) for _ in range(threads)]
     roll = rollout.Rollout(nthread=threads if threads > 1 else 0)
+    # Data of one scene do for no other.
+    scenes = np.array([pool.starts[row].scene for row in rows])
+    groups = [np.flatnonzero(scenes == scene) for scene in np.unique(scenes)]
+    datas = [[mujoco.MjData(listed[group[0]]) for _ in range(threads)] for group in groups]
 
     def run() -> object:
-        return roll.rollout(listed, datas, first, control)[0][:, -1]
+        return [
+            roll.rollout([listed[i] for i in group], data, first[group], control[group])[0][:, -1]
+            for group, data in zip(groups, datas, strict=True)
+        ]
 
     run()
     return run
