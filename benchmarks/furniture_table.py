@@ -193,8 +193,8 @@ def _register_tasks() -> None:
     """Make the tasks known; not where this is imported only, since every list of tasks would have them too."""
     for kind in ("drawer", "door", "flap"):
         draws = furniture_alone(RequestedFurniture(_FURNITURE, PartChoice((kind,))))
-        register_task("furniture", f"open_{kind}", draws=draws)(_moving("open"))
-        register_task("furniture", f"close_{kind}", draws=draws)(_moving("shut"))
+        register_task("furniture", f"open_{kind}", draws=draws, rigid=False)(_moving("open"))
+        register_task("furniture", f"close_{kind}", draws=draws, rigid=False)(_moving("shut"))
 
 
 def assets_in(folder: Path | None) -> Iterator[tuple[Path | None, Asset]]:

@@ -148,6 +148,8 @@ class EvaluationConfig:
         """Refuse errors that nobody would notice."""
         errors = self.errors
         errors.check()
+        if errors.of_objects:
+            self._check_tasks_have_objects(errors.of_objects[0])
         if self.policy is None:
             if errors.of_cameras and self.pose == "oracle":
                 raise InputError(
@@ -169,6 +171,21 @@ class EvaluationConfig:
             lacking = [name for name in CAMERAS.values() if name not in errors.cameras]
             if lacking:
                 raise InputError(f"--cameras: DROID's format needs {' and '.join(lacking)} too")
+
+    def _check_tasks_have_objects(self, option: str) -> None:
+        # Loads the simulator: only with errors of objects.
+        from manipose_mj.tasks import registered  # noqa: F401  (registers the tasks)
+        from manipose_mj.tasks.core.registry import named_task
+
+        lacking = [task for task in self.tasks if not named_task(task).rigid]
+        if lacking:
+            more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
+            have = "has" if len(lacking) == 1 else "have"
+            some = "those tasks" if lacking[1:] else "that task"
+            what = "it" if len(lacking) == len(self.tasks) else some
+            raise InputError(
+                f"{option}: {', '.join(lacking[:3])}{more} {have} no objects; leave {what} out"
+            )
 
     def _check_grasps(self) -> None:
         if self.grasps is None:

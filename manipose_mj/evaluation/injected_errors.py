@@ -82,9 +82,16 @@ class InjectedErrors:
         return ", ".join([*told, *(["taken to stand upright"] if self.assume_upright else [])])
 
     @property
+    def of_objects(self) -> tuple[str, ...]:
+        """The options given that concern objects' poses."""
+        return self._given("pose_error_cm", "pose_error_deg", "assume_upright")
+
+    @property
     def of_cameras(self) -> tuple[str, ...]:
         """The options given that concern cameras."""
-        names = ("camera_error_cm", "camera_error_deg", "depth_noise", "cameras")
+        return self._given("camera_error_cm", "camera_error_deg", "depth_noise", "cameras")
+
+    def _given(self, *names: str) -> tuple[str, ...]:
         return tuple(_option(name) for name in names if name in (self.identity or {}))
 
     @property

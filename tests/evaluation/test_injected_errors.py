@@ -92,6 +92,51 @@ def test_what_nobody_would_notice_is_refused(tmp_path, errors, changes, said):
     assert not (tmp_path / "out").exists()
 
 
+OPEN = [f"articulated/open_{level}_drawer" for level in ("top", "middle", "bottom")]
+NOTICED_BY_NOBODY = "articulated/open_middle_drawer has no objects; leave "
+
+
+@pytest.mark.parametrize(
+    ("tasks", "errors", "changes", "said"),
+    [
+        (OPEN[1:2], {"pose_error_cm": 1.0}, {}, f"--pose-error-cm: {NOTICED_BY_NOBODY}it out"),
+        (OPEN[1:2], {"pose_error_deg": 1.0}, {}, f"--pose-error-deg: {NOTICED_BY_NOBODY}it out"),
+        (OPEN[1:2], {"assume_upright": True}, {}, f"--assume-upright: {NOTICED_BY_NOBODY}it out"),
+        (
+            OPEN[1:2],
+            {"pose_error_cm": 1.0},
+            {"policy": PolicySettings("a:b", obs_mode="pose")},
+            f"--pose-error-cm: {NOTICED_BY_NOBODY}it out",
+        ),
+        (
+            [TASK, OPEN[1]],
+            {"pose_error_cm": 1.0},
+            {},
+            f"--pose-error-cm: {NOTICED_BY_NOBODY}that task out",
+        ),
+        (
+            [*OPEN, "articulated/close_oven", TASK],
+            {"pose_error_cm": 1.0},
+            {},
+            f"--pose-error-cm: {', '.join(OPEN)} and 1 more have no objects; leave those tasks out",
+        ),
+    ],
+)
+def test_errors_of_objects_need_objects(tmp_path, tasks, errors, changes, said):
+    with pytest.raises(InputError) as refusal:
+        EvaluationConfig(tuple(tasks), tmp_path, errors=InjectedErrors(**errors), **changes)
+    assert str(refusal.value) == said
+
+
+@pytest.mark.parametrize("task", ["articulated/store_oven", "articulated/take_out_oven", TASK])
+def test_tasks_with_objects_take_errors_of_them(task, tmp_path):
+    EvaluationConfig((task,), tmp_path, errors=InjectedErrors(pose_error_cm=1.0))
+
+
+def test_late_targets_are_noticed_without_objects(tmp_path):
+    EvaluationConfig((OPEN[1],), tmp_path, errors=InjectedErrors(latency_ms=40.0))
+
+
 @pytest.mark.parametrize("value", [-1.0, float("inf"), float("nan")])
 def test_sizes_are_finite_and_not_negative(value):
     with pytest.raises(InputError, match="--pose-error-cm is"):

@@ -182,6 +182,10 @@ for _name, _openable in OPENABLES.items():
         ("store", _store, with_cavity(_openable.requested, taken=False, fillers=_STORED_BESIDE)),
         ("take_out", _take_out, with_cavity(_openable.requested, taken=True, fillers=_LEFT_INSIDE)),
     ):
-        register_task("articulated", f"{_verb}_{_name}", tags=("articulated", _verb), draws=_draws)(
-            _make(_openable)
-        )
+        register_task(
+            "articulated",
+            f"{_verb}_{_name}",
+            tags=("articulated", _verb),
+            draws=_draws,
+            rigid=_verb in ("store", "take_out"),
+        )(_make(_openable))

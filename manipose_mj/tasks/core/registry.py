@@ -37,6 +37,7 @@ class TaskSpec:
 
     Attributes:
       draws: Makes the draw of an episode's objects; None where all episodes have the same.
+      rigid: Whether there are rigid objects in its scenes, beside furniture.
     """
 
     domain: str
@@ -45,6 +46,7 @@ class TaskSpec:
     tags: tuple[str, ...]
     summary: str
     draws: ObjectDrawFactory | None = None
+    rigid: bool = True
 
     @property
     def full_name(self) -> str:
@@ -94,6 +96,7 @@ def register_task(
     *,
     tags: Sequence[str] = (),
     draws: ObjectDrawFactory | None = None,
+    rigid: bool = True,
 ) -> Callable[[FactoryT], FactoryT]:
     """Register the decorated factory as `domain/name`: for this package's tasks and for anybody's.
 
@@ -107,6 +110,7 @@ def register_task(
       tags: For `dm_control.suite`'s subsets.
       draws: Where the objects differ from episode to episode: makes, for an environment, what draws them.
         The factory then takes those that were drawn as a second argument, `objects`.
+      rigid: False where no scene has a rigid object: evaluations then refuse errors of objects' poses.
 
     The first line of the factory's docstring is the summary that `manipose list` shows; the rest goes
     to the task's card.
@@ -127,7 +131,7 @@ def register_task(
         if not factory.__doc__:
             raise ValueError(f"the factory of {domain}/{name} needs a docstring")
         summary = factory.__doc__.strip().splitlines()[0]
-        spec = TaskSpec(domain, name, factory, tuple(tags), summary, draws)
+        spec = TaskSpec(domain, name, factory, tuple(tags), summary, draws, rigid)
         for listener in _listeners:
             listener.check(spec)
         for listener in _listeners:
