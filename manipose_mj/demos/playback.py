@@ -28,6 +28,7 @@ class RecordedPolicy:
         Raises:
           InputError: There are none, one is broken, or two hold an episode in the same control mode.
         """
+        self._data = data
         self._episodes: dict[tuple[str, int], dict[str, tuple[DemoSet, DemoEpisode]]] = {}
         for demos in find_sets(Path(data)):
             for episode in demos.episodes:
@@ -48,9 +49,7 @@ class RecordedPolicy:
             another rate.
         """
         if (task, seed) not in self._episodes:
-            raise InputError(
-                f"no recording of {task} with seed {seed}; record with the same --seed"
-            )
+            raise self._not_recorded(task, seed)
         modes = self._episodes[task, seed]
         if action_space.control_mode not in modes:
             path = next(iter(modes.values()))[0].path
@@ -74,6 +73,17 @@ class RecordedPolicy:
     def infer(self, obs: Mapping[str, Any]) -> dict[str, Any]:
         """All actions."""
         return {"actions": self._actions, "done": True}
+
+    def _not_recorded(self, task: str, seed: int) -> InputError:
+        """What can be played instead of an episode that nobody recorded."""
+        said = f"{self._data}: holds no recording of {task}"
+        count = sum(name == task for name, _ in self._episodes)
+        if not count:
+            return InputError(f"{said}; it has {', '.join(sorted({n for n, _ in self._episodes}))}")
+        return InputError(
+            f"{said} with seed {seed}, but {count} with others; take the recording's --seed and at most {count} --episodes, "
+            "fewer where attempts failed (--failures keeps those), or add some by `manipose demos record --resume`"
+        )
 
 
 def slowed(actions: Float[np.ndarray, "t n"], hz: float) -> Float[np.ndarray, "s n"]:
