@@ -48,7 +48,11 @@ class _Names:
 
 
 def draw_pool(
-    config: EnvConfig, episodes: Sequence[int | EpisodeSpec], vary: Vary | None = None
+    config: EnvConfig,
+    episodes: Sequence[int | EpisodeSpec],
+    vary: Vary | None = None,
+    *,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> StartPool:
     """The starts of these episodes, as `suite.make(config)` begins them.
 
@@ -57,6 +61,7 @@ def draw_pool(
       episodes: Their seeds, or what they are, with seeds; each seed once.
       vary: Gives the starts to take instead of each episode's own; all of them have its seed. They state every field
         of the model that any of them changes.
+      on_progress: Called with the number of episodes drawn and that of all.
 
     Raises:
       InputError: A mode cannot be batched, a seed is none, or the task cannot use the objects.
@@ -76,8 +81,9 @@ def draw_pool(
     environment = suite.make(config, specs[0].seed)
     assert isinstance(environment, TaskEnvironment)
     drawn = _Drawing(environment, config)
-    for spec in specs:
+    for done, spec in enumerate(specs, 1):
         drawn.add(spec, vary)
+        on_progress(done, len(specs))
     environment.close()
     return drawn.pool()
 

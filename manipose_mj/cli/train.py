@@ -101,8 +101,12 @@ def train_ppo(
     if policy is not None:
         Trained.load(policy)  # drawing starts takes minutes
     kept = pool is not None and pool.exists()
-    with output.working_on("drawing starts"):
-        drawn = training_pool(config, pool)
+    with output.Progress("starts") as progress:
+
+        def counted(done: int, total: int) -> None:
+            progress.update(done, total, "drawn")
+
+        drawn = training_pool(config, pool, counted)
     console = output.standard_error()
     if kept:
         about = sorted({start.object_name for start in drawn.starts})

@@ -71,10 +71,19 @@ class TrainingConfig:
     ppo: PpoConfig = PpoConfig()
 
 
-def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool:
+def training_pool(
+    config: TrainingConfig,
+    path: Path | None = None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> StartPool:
     """The starts, read from a file if it is there, otherwise drawn and written to it.
 
     One start is drawn first: what cannot be trained is refused before the others are drawn.
+
+    Args:
+      config: Of the training.
+      path: Of the file; None: they are kept nowhere.
+      on_progress: Called with the number of starts drawn and that of all.
 
     Raises:
       InputError: The task is none that can be trained, the worlds are too few, an episode is shorter than an action, the
@@ -96,7 +105,7 @@ def training_pool(config: TrainingConfig, path: Path | None = None) -> StartPool
         pool = draw_pool(env_config, seeds[:1])
         horizon = _checked_horizon(config, pool.layout, path)
         if len(seeds) > 1:
-            pool = draw_pool(env_config, seeds)
+            pool = draw_pool(env_config, seeds, on_progress=on_progress)
         if path is not None:
             pool.save(path)
     return replace(pool, layout=replace(pool.layout, horizon=horizon))

@@ -28,8 +28,9 @@ TASK, PIECES = "articulated/open_middle_drawer", ("cabinet_000", "cabinet_003")
 
 def test_starts_are_kept_in_a_file_with_shorter_episodes(tmp_path):
     config = TrainingConfig(TASK, starts=2, objects=PIECES, episode=4.0)
-    pool = training_pool(config, tmp_path / "starts")
-    assert pool.layout.horizon == 200
+    told = []
+    pool = training_pool(config, tmp_path / "starts", lambda *counts: told.append(counts))
+    assert pool.layout.horizon == 200 and told == [(1, 2), (2, 2)]
     again = training_pool(config, tmp_path / "starts")
     assert again.seeds == pool.seeds == (0, 1)
     other = TrainingConfig("articulated/close_middle_drawer", starts=2, objects=PIECES)
