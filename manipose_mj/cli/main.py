@@ -64,8 +64,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError as error:
         said = f" ({error})" if str(error) else ""
         return _fail(f"out of memory{said}", EXIT_FAILED)
-    except KeyboardInterrupt:
-        return _fail("interrupted; whole results are kept", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        kept = str(interrupt) or "whole results, if there are any yet, are kept"
+        return _fail(f"interrupted; {kept}", EXIT_INTERRUPTED)
     except BrokenPipeError:
         # The reader of a pipe has left: the interpreter must not complain about it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -101,7 +103,7 @@ def train_ppo(
     if policy is not None:
         Trained.load(policy)  # drawing starts takes minutes
     kept = pool is not None and pool.exists()
-    with output.Progress("starts") as progress:
+    with output.Progress("starts") as progress, _told_what_is_kept(out, pool):
 
         def counted(done: int, total: int) -> None:
             progress.update(done, total, "drawn")
@@ -128,6 +130,20 @@ def train_ppo(
             f"overflowed {row['overflowed']:.1%}, diverged {row['diverged']:.0f}"
         )
 
-    train(config, drawn, out, show)
+    with _told_what_is_kept(out, pool):
+        train(config, drawn, out, show)
     output.standard_output().print(f"policy: {out / POLICY_FILE}", soft_wrap=True)
     return 0
+
+
+@contextmanager
+def _told_what_is_kept(out: Path, pool: Path | None) -> Iterator[None]:
+    """Inside, an interruption of the training says which of its files are there."""
+    from manipose_mj.learning.training import POLICY_FILE
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        files = [each for each in (out / POLICY_FILE, pool) if each is not None and each.exists()]
+        kept = " and ".join(map(str, files))
+        raise KeyboardInterrupt(f"kept: {kept}" if kept else "nothing was written yet") from None

@@ -12,7 +12,7 @@ import jax
 import pytest
 
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.cli.main import EXIT_INPUT, main
+from manipose_mj.cli.main import EXIT_INPUT, EXIT_INTERRUPTED, main
 from manipose_mj.errors import InputError
 from manipose_mj.learning import trained, training
 from manipose_mj.learning.frames import frame_of
@@ -140,6 +140,22 @@ def test_the_engine_has_as_many_threads_as_there_are_jobs(tmp_path, monkeypatch,
     assert "the policy does not see where the object shall go" in note
     assert main(["train", "ppo", TASK, "--jobs", "0"]) == EXIT_INPUT
     assert "jobs is 0; expected at least 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_an_interruption_says_what_is_kept(kept, tmp_path, monkeypatch, capsys):
+    """Of starts that are being drawn, then of an update before the first policy."""
+
+    def interrupted(*given, **options):
+        raise KeyboardInterrupt
+
+    starts = tmp_path / "starts"
+    monkeypatch.setattr(training, "from_pool" if kept else "draw_pool", interrupted)
+    words = ["--engine", "c", "--worlds", "2", "--starts", "1", "--objects", PIECES[0]]
+    words += ["--out", str(tmp_path / "ppo"), "--pool", str(starts)]
+    assert main(["train", "ppo", TASK, *words]) == EXIT_INTERRUPTED
+    said = f"kept: {starts}" if kept else "nothing was written yet"
+    assert capsys.readouterr().err.splitlines()[-1] == f"manipose: interrupted; {said}"
 
 
 @pytest.mark.full
