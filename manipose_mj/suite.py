@@ -64,7 +64,8 @@ def load(
             'or make(EnvConfig("single_object/target_pose"))'
         )
     spec = task_spec(domain, task)
-    return make(env_config(spec.full_name, config), seed, environment_kwargs=environment_kwargs)
+    described = env_config(spec.full_name, config, others=("seed", "environment_kwargs"))
+    return make(described, seed, environment_kwargs=environment_kwargs)
 
 
 def make(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -65,9 +66,16 @@ def make(
     chosen = available_engine(engine)
     if isinstance(task, EnvConfig) and config:
         raise InputError(f"{', '.join(config)} beside an EnvConfig; expected all options in it")
-    described = task if isinstance(task, EnvConfig) else env_config(task, config)
+    described = task if isinstance(task, EnvConfig) else env_config(task, config, others=_OWN)
     pool = draw_pool(described, list(seeds))
     return from_pool(pool, worlds, chosen, threads=threads, visual=visual, capacity=capacity)
+
+
+_OWN = tuple(
+    name
+    for name, parameter in inspect.signature(make).parameters.items()
+    if parameter.kind is parameter.KEYWORD_ONLY
+)
 
 
 def from_pool(

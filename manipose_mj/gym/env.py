@@ -85,7 +85,7 @@ class ManiPoseEnv(gymnasium.Env[Any, np.ndarray]):
         }
         self._arguments: dict[str, Any] = {"task": spec, **own, **config}
         self.render_mode = render_mode
-        asked = env_config(spec.full_name, config)
+        asked = env_config(spec.full_name, config, others=own)
         self.environment = suite.make(asked)
         self._primitive = (
             asked.control_mode == PRIMITIVE

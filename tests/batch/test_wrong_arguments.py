@@ -70,6 +70,22 @@ def test_a_configuration_has_all_options(worlds):
     )
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"thread": 2}, "unknown option 'thread'; did you mean threads?"),
+        ({"capacty": None}, "unknown option 'capacty'; did you mean capacity?"),
+        ({"obs_mod": "state"}, "unknown option 'obs_mod'; did you mean obs_mode?"),
+        (
+            {"qqqq": 1},
+            "unknown option 'qqqq'; known: capacity, control_mode, engine, .*, seed, seeds, ",
+        ),
+    ],
+)
+def test_misspelt_options_are_told_with_those_of_both_kinds(options, message):
+    refused(lambda: batch.make(TASK, worlds=1, engine="c", **options), message)
+
+
 def test_both_kinds_of_keys_begin_alike(worlds):
     for seed in range(4):
         typed, raw = jax.random.key(seed), np.array([0, seed], np.uint32)

@@ -274,6 +274,7 @@ def test_spaces_follow_the_specifications():
         ({"render_mode": "rgb"}, "render mode 'rgb'"),
         ({"split": "validation"}, "split"),
         ({"obs_mod": "state"}, "unknown option 'obs_mod'; did you mean obs_mode"),
+        ({"heigth": 64}, "unknown option 'heigth'; did you mean height"),
         ({"obs_mode": ["state", "pose"]}, r"obs_mode is \['state', 'pose'\]; expected a text"),
         ({"obs_mode": None}, "obs_mode is None"),
     ],

@@ -132,12 +132,13 @@ class EnvOptions(TypedDict, total=False):
     latency: float
 
 
-def env_config(task: str, options: EnvOptions) -> EnvConfig:
+def env_config(task: str, options: EnvOptions, others: Iterable[str] = ()) -> EnvConfig:
     """An environment's configuration from the keywords of a front door.
 
     Args:
       task: `"domain/name"`.
       options: Fields of `EnvConfig`.
+      others: The front door's own keywords, which a misspelt one may stand for.
 
     Raises:
       InputError: The task is no name, a field is unknown or holds what it cannot, or `objects` and `split` name different
@@ -147,7 +148,7 @@ def env_config(task: str, options: EnvOptions) -> EnvConfig:
         raise InputError(f'task is {task!r}; expected "domain/name"')
     for name in options:
         if name not in EnvOptions.__annotations__:
-            raise unknown_name("option", name, EnvOptions.__annotations__)
+            raise unknown_name("option", name, [*EnvOptions.__annotations__, *others])
     config, split = EnvConfig(task, **options), options.get("split")
     if split is not None and split != config.split:
         raise _two_splits(config.split, split)

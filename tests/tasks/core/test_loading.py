@@ -88,6 +88,8 @@ def test_the_time_limit_ends_the_episode():
     assert ended == [False] * 4 + [True]
     with pytest.raises(InputError, match="unknown argument of an environment 'time_limits'; did"):
         load(*STORE, seed=0, environment_kwargs={"time_limits": 0.1})
+    with pytest.raises(InputError, match=r"'environment_args'; did you mean environment_kwargs\?"):
+        suite.load(*STORE, environment_args={})
 
 
 @pytest.mark.parametrize(
