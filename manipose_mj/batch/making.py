@@ -55,11 +55,14 @@ def make(
         `objects` (or `"train"`, `"test"`, as `split`), `split`, `randomisation`, `sensors`, `latency`.
 
     Raises:
-      InputError: A name or mode is unknown or cannot be batched, or the engine cannot run here.
+      InputError: A name or mode is unknown or cannot be batched, `seed` and `seeds` are given, or the engine cannot run
+        here.
     """
     require_worlds(worlds)
+    check_seed(seed)
+    if seeds is not None and seed:
+        raise InputError(f"seed is {seed} beside seeds; give seed or seeds")
     if seeds is None:
-        check_seed(seed)
         seeds = range(seed, seed + min(worlds, DEFAULT_STARTS))
     elif not isinstance(seeds, Iterable) or isinstance(seeds, str):
         raise InputError(f"seeds is {seeds!r}; expected whole numbers, each once")

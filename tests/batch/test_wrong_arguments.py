@@ -75,6 +75,7 @@ def test_a_configuration_has_all_options(worlds):
     [
         ({"thread": 2}, "unknown option 'thread'; did you mean threads?"),
         ({"capacty": None}, "unknown option 'capacty'; did you mean capacity?"),
+        ({"seeds": [1], "seed": 3}, "seed is 3 beside seeds; give seed or seeds"),
         ({"obs_mod": "state"}, "unknown option 'obs_mod'; did you mean obs_mode?"),
         (
             {"qqqq": 1},
@@ -82,7 +83,7 @@ def test_a_configuration_has_all_options(worlds):
         ),
     ],
 )
-def test_misspelt_options_are_told_with_those_of_both_kinds(options, message):
+def test_misspelt_or_contrary_options_are_refused(options, message):
     refused(lambda: batch.make(TASK, worlds=1, engine="c", **options), message)
 
 
