@@ -51,8 +51,16 @@ def test_what_cannot_be_seen_is_refused_in_one_line():
     worlds = make(TASK, 1, seeds=(0,), objects=("box_000",), obs_mode="state")
     with pytest.raises(InputError, match="left"):
         Cameras(worlds, ("lift",))
-    with pytest.raises(InputError, match="see nothing"):
+    with pytest.raises(InputError, match="height is 0; expected a whole number, at least 1"):
         Cameras(worlds, height=0)
+    for names in ("front", 5):
+        with pytest.raises(InputError, match=f"names is {names!r}; expected a tuple of cameras'"):
+            Cameras(worlds, names)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="names is empty; expected some of front, left, .* None"):
+        Cameras(worlds, ())
+    blind = SensorConfig(cameras=())
+    with pytest.raises(InputError, match="have no cameras; make them with sensors that name some"):
+        Cameras(make(TASK, 1, seeds=(0,), objects=("box_000",), obs_mode="state", sensors=blind))
     with pytest.raises(InputError, match="colours need engine 'warp'"):
         Cameras(worlds, rgb=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import jax
@@ -12,7 +13,7 @@ from jaxtyping import Float, Int, UInt8
 from manipose_mj.batch.starts import RowModels
 from manipose_mj.batch.state import State, check_state
 from manipose_mj.batch.worlds import Worlds
-from manipose_mj.errors import InputError, unknown_name
+from manipose_mj.errors import InputError, check_count, unknown_name
 from manipose_mj.mjcf.cameras.ray_camera import camera_intrinsics
 from manipose_mj.poses import Array, compose
 from manipose_mj.tasks.scene.indices import FIRST
@@ -68,12 +69,20 @@ class Cameras:
         """
         pool = worlds.pool
         known = pool.layout.cameras
+        if names is not None and (isinstance(names, str) or not isinstance(names, Iterable)):
+            raise InputError(f"names is {names!r}; expected a tuple of cameras' names")
         self.names = known if names is None else tuple(names)
         for name in self.names:
             if name not in known:
                 raise unknown_name("camera of these worlds", name, known)
-        if not self.names or height < 1 or width < 1:
-            raise InputError(f"{len(self.names)} cameras of {height} x {width} pixels see nothing")
+        if not known:
+            raise InputError("these worlds have no cameras; make them with sensors that name some")
+        if not self.names:
+            raise InputError(
+                f"names is empty; expected some of {', '.join(known)}, or None for all"
+            )
+        check_count("height", height, least=1)
+        check_count("width", width, least=1)
         self._whose = worlds.identity, worlds.count
         self._shape = (worlds.count, len(self.names), height, width)
         self._chosen = np.array([known.index(name) for name in self.names])
