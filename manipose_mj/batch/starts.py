@@ -167,7 +167,7 @@ class StartPool:
         try:
             version, pool = pickle.loads(Path(path).read_bytes())
         except Exception as error:  # damaged pickles raise anything
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            reason = " ".join(_reason(error).split())
             raise InputError(
                 f"{path}: no pool of starts can be read from it ({reason[:200]})"
             ) from None
@@ -178,6 +178,15 @@ class StartPool:
         if not isinstance(pool, cls):
             raise InputError(f"{path}: holds a {type(pool).__name__}, no pool of starts")
         return pool
+
+
+def _reason(error: Exception) -> str:
+    """Why a file could not be read, for people as far as it is known."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    if isinstance(error, EOFError):
+        return "it is empty, or cut short"
+    return f"{type(error).__name__}: {error}"
 
 
 class RowModels:

@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -22,7 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from manipose_mj.errors import InputError
+from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.learning import grip
 from manipose_mj.learning.frames import FRAMES
 from manipose_mj.learning.network import ActorCritic, NetworkConfig, Normaliser
@@ -81,9 +82,8 @@ class Trained:
         Raises:
           InputError: There is no such file, or it is none of these.
         """
+        stored = _arrays(path)
         try:
-            with np.load(path) as file:
-                stored = {name: file[name] for name in file.files}
             header = json.loads(bytes(stored[_HEADER]))
             if header["format"] != _FORMAT:
                 raise InputError(f"{path}: format {header['format']}; expected {_FORMAT}")
@@ -107,8 +107,27 @@ class Trained:
             raise InputError(
                 f"{path}: no trained policy can be read from it (lacks {error})"
             ) from None
-        except (OSError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        except (ValueError, TypeError) as error:
             raise InputError(f"{path}: no trained policy can be read from it ({error})") from None
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    """What a `.npz` file holds.
+
+    Raises:
+      InputError: There is no such file, or it is none of these.
+    """
+    try:
+        with path.open("rb") as file:
+            if zipfile.is_zipfile(file):
+                stored = np.load(path)
+                return {name: stored[name] for name in stored.files}
+        reason = "it is no .npz file"
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except (ValueError, EOFError, zlib.error, zipfile.BadZipFile):
+        reason = "it is damaged, or holds others than arrays of numbers"
+    raise InputError(f"{path}: no trained policy can be read from it ({reason})")
 
 
 def _filled(actor: eqx.nn.MLP, stored: Mapping[str, np.ndarray]) -> eqx.nn.MLP:
@@ -134,8 +153,12 @@ class TrainedPolicy:
         Raises:
           InputError: There is none, or it is no trained policy.
         """
-        own = Path(str(resources.files("manipose_mj.learning"))) / "weights" / f"{path}.npz"
+        weights = Path(str(resources.files("manipose_mj.learning"))) / "weights"
+        own = weights / f"{path}.npz"
         file = own if own.is_file() else Path(path)
+        if not file.exists() and path == file.stem:  # meant as a name
+            shipped = [each.stem for each in weights.glob("*.npz")]
+            raise unknown_name("trained policy", path, shipped)
         self._trained = trained = Trained.load(file)
         self._frame = FRAMES[trained.frame]
         self.metadata = {

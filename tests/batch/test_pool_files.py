@@ -32,5 +32,14 @@ def test_a_file_that_holds_no_pool_is_named(content, tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match="no pool of starts can be read from it"):
+    said = r"no pool of starts can be read from it \(No such file or directory\)$"
+    with pytest.raises(InputError, match=said):
         StartPool.load(tmp_path / "none")
+
+
+@pytest.mark.parametrize("content", [b"", pickle.dumps((mujoco.__version__, None))[:-4]])
+def test_an_empty_file_is_told(content, tmp_path):
+    path = tmp_path / "pool"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="read from it .(it is empty|UnpicklingError)"):
+        StartPool.load(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 
 import jax
 import jax.numpy as jnp
@@ -75,6 +76,39 @@ def test_what_is_no_trained_policy_is_refused_in_one_line(tmp_path):
     np.savez(tmp_path / "other.npz", header=np.zeros(3))
     with pytest.raises(InputError, match="no trained policy"):
         TrainedPolicy(str(tmp_path / "other.npz"))
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"\x93NUMPY", pickle.dumps([1])])
+def test_a_file_that_is_no_npz_is_told_without_advice_on_pickles(content, tmp_path):
+    path = tmp_path / "policy.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"can be read from it \(it is no .npz file\)$"):
+        Trained.load(path)
+
+
+def test_a_file_of_other_things_than_numbers_is_told_without_advice_on_pickles(tmp_path):
+    path = tmp_path / "policy.npz"
+    np.savez(path, header=np.array([None]))
+    with pytest.raises(InputError, match=r"holds others than arrays of numbers\)$"):
+        Trained.load(path)
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("open_cabinet_dor", "unknown trained policy 'open_cabinet_dor'; did you mean open_cab"),
+        ("xyz", "known: lift, open_cabinet_door, open_middle_drawer"),
+        ("./xyz", r"xyz: no trained policy can be read from it \(No such file or directory\)"),
+        (
+            "xyz.npz",
+            r"xyz.npz: no trained policy can be read from it \(No such file or directory\)",
+        ),
+    ],
+)
+def test_a_misspelt_policy_that_ships_is_told_with_those_that_do(path, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=said):
+        TrainedPolicy(path)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -134,8 +134,10 @@ def read_exchanges(path: Path) -> list[Exchange]:
 def _records(path: Path) -> list[Exchange]:
     try:
         *lines, unfinished = path.read_text(encoding="utf-8").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read (no text in UTF-8)") from None
     records = []
     for number, line in enumerate(lines, 1):
         try:
@@ -153,6 +155,14 @@ def _record(document: Any) -> Exchange:
     Raises:
       TypeError: It has other fields, or others in them.
     """
+    if not isinstance(document, dict):
+        raise TypeError("it is no JSON object")
+    for field in fields(Exchange):
+        if field.name not in document and field.default is MISSING:
+            raise TypeError(f"lacks field {field.name!r}")
+    for name in document:
+        if name not in Exchange.__annotations__:
+            raise TypeError(f"unknown field {name!r}")
     record = Exchange(**document)
     for name, kind in _KINDS.items():
         if not isinstance(getattr(record, name), kind):

@@ -111,6 +111,9 @@ def check_card(folder: Path) -> int:
     path = folder / CARD_FILE
     try:
         stated = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        what = "no card; `manipose card` writes one" if folder.is_dir() else "no such folder"
+        raise InputError(f"{folder}: {what}") from None
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except ValueError as error:

@@ -138,6 +138,35 @@ def test_records_that_are_none_are_told(tmp_path, line):
         read_exchanges(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('{"a": 1}', "lacks field 'model'"),
+        ('{"model": "m", "parameters": {}}', "lacks field 'messages'"),
+        (
+            '{"model": "m", "parameters": {}, "messages": [], "schema": {}, "reply": "", "a": 1}',
+            "unknown field 'a'",
+        ),
+        ("[1]", "it is no JSON object"),
+    ],
+)
+def test_records_of_other_fields_are_told_by_these(tmp_path, line, said):
+    path = tmp_path / "1.jsonl"
+    path.write_text(f"{line}\n", encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        read_exchanges(path)
+    assert str(refusal.value) == f"{path}, line 1: no recorded exchange ({said})"
+
+
+def test_files_of_records_that_cannot_be_read_are_told(tmp_path):
+    with pytest.raises(InputError, match=r"cannot be read \(No such file or directory\)$"):
+        read_exchanges(tmp_path / "none.jsonl")
+    path = tmp_path / "1.jsonl"
+    path.write_bytes(b"\xff\n")
+    with pytest.raises(InputError, match=r"cannot be read \(no text in UTF-8\)$"):
+        read_exchanges(path)
+
+
 def test_an_own_instruction_is_not_planned_again_until_the_goals_are_met(tmp_path):
     append_exchange(tmp_path / "1.jsonl", Exchange("m", {}, [], {}, "one"))
     model = ReplayModel(tmp_path)

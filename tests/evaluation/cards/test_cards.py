@@ -197,6 +197,11 @@ def test_a_card_without_a_field_or_with_another_text_is_refused(card, capsys):
     assert "not the text of card.json" in refusal(card, capsys)
 
 
+def test_a_folder_without_a_card_is_told(tmp_path, capsys):
+    assert f"{tmp_path}: no card; `manipose card` writes one" in refusal(tmp_path, capsys)
+    assert f"{tmp_path}/none: no such folder" in refusal(tmp_path / "none", capsys)
+
+
 def test_a_run_of_another_protocol_is_refused(card, capsys):
     path = card / "runs" / "0" / "run.json"
     run = json.loads(path.read_text())
