@@ -114,9 +114,11 @@ def list_assets(directory: Path | str) -> list[Path]:
     """The asset folders directly under `directory`, sorted by name.
 
     Raises:
-      InputError: The directory does not exist or holds no asset.
+      InputError: The directory does not exist, is a file or holds no asset.
     """
     directory = Path(directory)
+    if directory.is_file():
+        raise InputError(f"{directory}: is a file; expected a folder of an asset or of assets")
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; expected a folder of built assets")
     folders = sorted(p.parent for p in directory.glob(f"*/{ASSET_FILE}"))

@@ -246,6 +246,10 @@ def find_sets(path: Path) -> list[DemoSet]:
     Raises:
       InputError: There is none, or a file is broken.
     """
+    if not path.exists():
+        raise InputError(
+            f"{path}: no such folder or file; expected what `manipose demos record` wrote"
+        )
     if path.is_file() and path.suffix != ".h5":
         raise InputError(f"{path}: expected a folder of demonstrations, or a file trajectory.*.h5")
     if path.suffix == ".h5" and not path.is_dir():

@@ -141,6 +141,19 @@ def test_bad_flags_exit_with_2(argv: str, capsys) -> None:
         ("render single_object/target_pose --out {tmp}/a.png --width 0", "nothing to show"),
         ("assets list {tmp}/none", "no such folder"),
         ("assets list {tmp}", "holds no asset folder"),
+        (
+            "assets list {tmp}/broken/model.xml",
+            "model.xml: is a file; expected a folder of an asset or of assets",
+        ),
+        (
+            "evaluate single_object/target_pose --protocol v1-real --assets {tmp}/broken/model.xml",
+            "model.xml: is a file; expected a folder of assets",
+        ),
+        (
+            "demos replay {tmp}/demoss",
+            "demoss: no such folder or file; expected what `manipose demos record` wrote",
+        ),
+        ("demos replay {tmp}/a.h5", "a.h5: no such folder or file; expected"),
         ("assets check {tmp}/none", "no such folder"),
         ("assets show {tmp}/broken", "field 'category' is missing"),
         ("assets show mgu_000", "did you mean mug_000"),

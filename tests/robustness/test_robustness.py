@@ -152,6 +152,8 @@ def test_wrong_input_is_one_line(tmp_path, capsys):
         Variation(object_turn_deg=float("nan"))
     with pytest.raises(InputError, match="holds no demonstrations"):
         recorded_plans(TASK, str(tmp_path), 1)
+    with pytest.raises(InputError, match="demoss: no such folder or file; expected"):
+        recorded_plans(TASK, "demoss", 1)
     with pytest.raises(InputError, match="plans is 0"):
         recorded_plans(TASK, str(tmp_path), 0)
     for words, said in (

@@ -48,7 +48,8 @@ def built_assets(folders: Sequence[str | Path]) -> list[BuiltAsset]:
     found = []
     for folder in map(Path, folders):
         if not folder.is_dir():
-            raise InputError(f"{folder}: no such folder of assets")
+            what = "is a file; expected a" if folder.is_file() else "no such"
+            raise InputError(f"{folder}: {what} folder of assets")
         patterns = ["/".join(["*"] * depth + [ASSET_FILE]) for depth in range(_DEPTH + 1)]
         files = [path for pattern in patterns for path in sorted(folder.glob(pattern))]
         found += [_stated(path) for path in files]
