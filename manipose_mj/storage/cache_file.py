@@ -17,9 +17,11 @@ def new_cache_file(path: Path) -> Iterator[Path]:
     """Where to write a file, which is moved to `path` at once when it is whole.
 
     Raises:
-      InputError: The cache cannot be written.
+      InputError: `path` is a folder, or cannot be written.
     """
     try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; expected the name of a file to write")
         path.parent.mkdir(parents=True, exist_ok=True)
         with staging(path) as scratch:
             yield scratch / path.name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import Any, cast
 
 import mujoco
 import pytest
@@ -43,3 +44,11 @@ def test_an_empty_file_is_told(content, tmp_path):
     path.write_bytes(content)
     with pytest.raises(InputError, match="read from it .(it is empty|UnpicklingError)"):
         StartPool.load(path)
+
+
+def test_a_folder_is_no_place_for_a_pool(tmp_path):
+    pool = StartPool(cast(Any, None), (), (), "", {})
+    with pytest.raises(InputError) as refusal:
+        pool.save(tmp_path)
+    assert str(refusal.value) == f"{tmp_path}: is a folder; expected the name of a file to write"
+    assert not list(tmp_path.iterdir())
