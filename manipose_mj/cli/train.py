@@ -41,12 +41,12 @@ def train_ppo(
     pool: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
     policy: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None,
 ) -> int:
-    """Learn to open or shut a drawer or door, or to move one object, by proximal policy optimisation.
+    """Learn to open or shut a drawer or door, or to move an object, by proximal policy optimisation.
 
     Writes policy.npz, which evaluate plays, and curve.json.
 
     Args:
-      task: One of articulated/open_* and close_*, or one about a single object, also of your own.
+      task: One of articulated/open_* and close_*, or one about an object and no furniture, also in clutter or of your own.
       out: Folder to write to; without it ppo/NAME.
       worlds: At the same time.
       starts: Episodes that the worlds begin with, drawn once.

@@ -39,7 +39,7 @@ class TrainingConfig:
     """What is trained, and for how long.
 
     Attributes:
-      task: One that opens or shuts a drawer or door, or that is about one object.
+      task: One that opens or shuts a drawer or door, or that is about an object and no furniture.
       worlds: At the same time.
       starts: Episodes that the worlds begin with, of the seeds from `first_start` on.
       first_start: The first of these seeds.

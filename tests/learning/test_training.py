@@ -74,6 +74,14 @@ def test_tasks_with_an_object_and_a_handle_are_refused():
     assert frame_of("single_object/target_pose_shelf", {"object", "shelf"}) == "object"
 
 
+def test_the_help_names_the_tasks_that_have_a_frame(capsys):
+    assert frame_of("clutter/pick", {"object", "clutter_1"}) == "object"
+    with pytest.raises(SystemExit):
+        main(["train", "ppo", "--help"])
+    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "or one about an object and no furniture, also in clutter or of your own" in told
+
+
 @pytest.mark.parametrize(
     ("option", "value"),
     [("minutes", "nan"), ("episode", "nan"), ("episode", "inf"), ("until", "2"), ("worlds", "0")],
