@@ -10,6 +10,7 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.labelling.axial_label import axial_label, axis_evidence
+from asset_pipeline.labelling.lying_label import lying_label
 from asset_pipeline.labelling.mirror_label import mirror_label
 from asset_pipeline.labelling.print_symmetry import print_symmetry, surface_colours
 from asset_pipeline.labelling.surface_cloud import SurfaceCloud
@@ -39,8 +40,8 @@ def scan_label(
 ) -> tuple[PoseLabel, LabelQuality]:
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
-    The frame is measured: `axial_label`, `mirror_label` and `tool_label` say how, and what they do
-    where the rules leave something open. What is smaller than 8 cm and not noisy is labelled as if it were enlarged
+    The frame is measured: `axial_label`, `lying_label`, `mirror_label` and `tool_label` say how, and what they
+    do where the rules leave something open. What is smaller than 8 cm and not noisy is labelled as if it were enlarged
     to that: its symmetries do not depend on its size.
 
     Args:
@@ -76,7 +77,7 @@ def scan_label(
     else:
         up = np.asarray(up, float) / np.linalg.norm(up)
         label, quality = _upright_label(cloud, object_type, up, category)
-        if stated and label.object_type == "axial":
+        if stated and label.object_type == "axial" and "axis" not in quality.residuals:
             confidence = min(quality.confidence, axis_evidence(cloud, up))
             quality = replace(quality, confidence=confidence)
     if textured:
@@ -103,4 +104,8 @@ def _upright_label(
         found = axial_label(cloud, up)
         if found is not None:
             return found
-    return mirror_label(cloud, up, object_type=object_type, category=category)
+    label, quality = mirror_label(cloud, up, object_type=object_type, category=category)
+    if label.symmetry.axial:
+        return label, quality
+    lying = lying_label(cloud, up, label.rotation.T, object_type=object_type)
+    return lying or (label, quality)

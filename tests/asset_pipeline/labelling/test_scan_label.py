@@ -109,6 +109,47 @@ def test_a_square_slabs_quarter_turns_follow_its_axes_and_a_notebook_keeps_x_acr
     assert abs(book.rotation[:, 0] @ LEAN @ UP) > np.cos(np.deg2rad(0.5))
 
 
+@pytest.mark.sample(4)
+@pytest.mark.parametrize(
+    ("solid", "members"),
+    [
+        (trimesh.creation.cylinder(0.008, 0.3), 2),
+        (trimesh.creation.cylinder(0.04, 0.01), 2),  # shorter than wide
+        (trimesh.creation.cylinder(0.03, 0.052), 2),  # spread alike along all axes
+        (trimesh.creation.cone(0.035, 0.09), 1),
+    ],
+    ids=["rod", "coin", "plug", "cone"],
+)
+@pytest.mark.parametrize("lying", [0, 1, 2])
+def test_a_body_of_revolution_has_its_axis_however_it_lies(solid, members, lying):
+    mesh = trimesh.Trimesh(solid.vertices @ np.roll(LEAN, lying, axis=1).T, solid.faces)
+    axis = LEAN[:, (2 - lying) % 3]
+    label, quality = scan_label(mesh, "mirror", UP, textured=False)
+    assert label.symmetry.axial and len(label.symmetry.rotations) == members
+    assert abs(label.rotation[:, 0] @ axis) > np.cos(np.deg2rad(0.5))
+    if members == 1:
+        assert label.rotation[:, 0] @ axis > 0  # towards its tip
+    np.testing.assert_allclose(label.extents[0], np.ptp(solid.vertices[:, 2]), atol=2e-3)
+    assert quality.confidence > 0.9
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize(
+    "solid",
+    [
+        trimesh.creation.box([0.01, 0.01, 0.3]),  # its corners are within the strict tolerance
+        trimesh.creation.cylinder(0.008, 0.3, sections=6),
+        trimesh.creation.cylinder(0.03, 0.1, sections=8),
+    ],
+    ids=["square", "hexagon", "octagon"],
+)
+def test_a_bar_that_lies_is_not_round(solid):
+    label, _ = scan_label(
+        trimesh.Trimesh(solid.vertices[:, [2, 0, 1]], solid.faces), "mirror", UP, textured=False
+    )
+    assert not label.symmetry.axial and len(label.symmetry.rotations) == 8
+
+
 def test_a_mug_stands_on_its_base_and_looks_towards_its_handle():
     label, quality = scan_label(_scan_of(_mug()), "mirror", UP)
     assert _angle(label.rotation[:, 0], LEAN @ UP) < 1
