@@ -12,6 +12,8 @@ NEARLY_CLOSED = 0.98
 # A vertex as far from its nearest neighbour as this many times the edges around: on 32 scans as
 # published the ratio is below 1.2.
 SPIKE = 1.7
+# From one face to the next, a cone of eight sides or more turns less; so do not all of a needle's few faces.
+ROUND_TURN = np.deg2rad(48.0)
 # Of the volume that bodies claim together, the share above which they reach into one another.
 OVERLAP = 1e-9
 # A face that hangs on one edge, and is longer than this many times the median edge, spans what it should not.
@@ -152,7 +154,7 @@ def drop_flaps(mesh: trimesh.Trimesh) -> int:
 def spikes(mesh: trimesh.Trimesh) -> int:
     """How many vertices stick out of the surface like needles, as one does whose number was damaged.
 
-    The tip of a cone is none: the edges that lead up to it are as long as those that end there.
+    The tip of a cone is none: the edges that lead up to it are as long as those that end there, or it is round.
     """
     surface = _stitched(mesh)
     points, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
@@ -178,7 +180,18 @@ def spikes(mesh: trimesh.Trimesh) -> int:
     sticks_out = np.linalg.norm(points - neighbours, axis=1) > nearest / 2
     # Where three faces meet the apex of a pyramid looks like a needle.
     long = nearest > SPIKE * np.maximum(facing, around)
-    return int(((degree > 3) & long & sticks_out).sum())
+    found = (degree > 3) & long & sticks_out
+    if found.any():
+        found &= _sharpest_turn(surface) > ROUND_TURN
+    return int(found.sum())
+
+
+def _sharpest_turn(mesh: trimesh.Trimesh) -> Float[np.ndarray, "vertices"]:
+    """Of each vertex, the largest angle between two faces that share an edge which ends there [rad]."""
+    turns = np.zeros(len(mesh.vertices))
+    for ends in np.asarray(mesh.face_adjacency_edges).T:
+        np.maximum.at(turns, ends, np.asarray(mesh.face_adjacency_angles))
+    return turns
 
 
 def _stitched(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -176,7 +176,11 @@ def _defects(mesh: trimesh.Trimesh) -> list[str]:
     if empty > MAX_EMPTY * count:
         found.append(f"{empty} of {count} faces have no area")
     if needles := spikes(mesh):
-        found.append(f"{needles} vertices stick out of the surface like needles")
+        found.append(
+            "1 vertex sticks out of the surface like a needle"
+            if needles == 1
+            else f"{needles} vertices stick out of the surface like needles"
+        )
     return found
 
 

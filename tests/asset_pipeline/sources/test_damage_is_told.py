@@ -72,7 +72,7 @@ DAMAGE: dict[str, tuple[str, str, Callable[[bytes], bytes], str]] = {
     "header": ("pace", "ply$", sub("property float texture_v", "propesty float texture_v"), "header cannot"),
     "size not stated": ("pace", "json$", sub("size_x", "size_w"), "states no size"),
     "flat": ("ycb", "obj$", lambda d: re.sub(rb"(?m)^v \S+", b"v 0", d), "flat"),
-    "needle": ("google_scanned_objects", "obj$", sub(r"v -0.055000", "v -0.955000"), "like needles"),
+    "needle": ("google_scanned_objects", "obj$", sub(r"v -0.055000", "v -0.955000"), "1 vertex sticks out"),
     "unit": ("partnet_mobility", "[01].obj$", scaled(0.0254), "another unit"),
     "garbage": ("partnet_mobility", "[01].obj$", scaled(1e20), "a coordinate is 5e+19"),
     "gigantic": ("partnet_mobility", "[01].obj$", scaled(1e5), "expected about 2"),
@@ -193,6 +193,18 @@ def test_sharp_corners_are_no_needles():
     assert spikes(trimesh.creation.box()) == 0
     assert spikes(trimesh.creation.icosphere()) == 0
     assert spikes(cone.subdivide().subdivide()) == 0
+
+
+@pytest.mark.parametrize(("sections", "squeeze"), [(8, 1.0), (32, 1.0), (32, 0.5)])
+def test_the_tip_of_a_plain_cone_is_no_needle(sections, squeeze):
+    cone = trimesh.creation.cone(0.035, 0.09, sections=sections)
+    assert spikes(cone.apply_scale([1, squeeze, 1])) == 0
+
+
+def test_a_vertex_that_is_moved_far_off_is_a_needle():
+    mesh = trimesh.creation.icosphere(3, 0.05)
+    mesh.vertices[100, 0] += 0.1
+    assert spikes(mesh) == 1
 
 
 def test_the_middle_of_a_fan_is_no_needle():
