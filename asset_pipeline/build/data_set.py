@@ -159,25 +159,28 @@ def build_item(
             if isinstance(item, MeshItem):
                 where = {PLACE: place(item.file, folder)}
                 provenance = replace(provenance, inputs=provenance.inputs | where)
-            said_type = item.options.object_type if isinstance(item, MeshItem) else None
+            options = item.options if isinstance(item, MeshItem) else None
+            said_type = None if options is None else options.object_type
+            guessed = options is not None and said_type is None and options.category is None
             asset = build_scan(
                 replace(scan, provenance=provenance),
                 target,
                 override,
-                type_stated=said_type is not None,
+                type_checked=guessed or said_type is not None,
             )
             if override is None:
-                _tell_type(said_type, asset)
+                _tell_type(said_type, asset, guessed=guessed)
     return True
 
 
-def _tell_type(said: ObjectType | None, asset: Asset) -> None:
-    """Warn where the type that a person said does not fit the shape."""
+def _tell_type(said: ObjectType | None, asset: Asset, *, guessed: bool) -> None:
+    """Warn where the type that a person said, or that was guessed by the object's name, does not fit the shape."""
     found = asset.label.object_type
     residuals = {} if asset.label_quality is None else asset.label_quality.residuals
-    if said == found == "axial" and "axis" not in residuals:
+    if found == "axial" and (guessed or said == found) and "axis" not in residuals:
         log.warning(
-            "--type axial: no axis of revolution was found; labelled by planes: say --type mirror"
+            "%s: no axis of revolution was found; labelled by planes: say --type mirror",
+            f"category {asset.category} by its name" if guessed else "--type axial",
         )
     if said not in (None, found):
         # A vessel with a handle has no axis that all of it is round about.
@@ -187,7 +190,7 @@ def _tell_type(said: ObjectType | None, asset: Asset) -> None:
 
 
 def build_scan(
-    scan: Scan, folder: Path, override: Override | None = None, *, type_stated: bool = False
+    scan: Scan, folder: Path, override: Override | None = None, *, type_checked: bool = False
 ) -> Asset:
     """Label, decompose and weigh one scan, and write its asset folder.
 
@@ -195,7 +198,7 @@ def build_scan(
       scan: Its mesh and what is known of it.
       folder: Of the asset.
       override: What a person said of its label.
-      type_stated: Whether a person said its type.
+      type_checked: Whether its type is to be checked, as in `scan_label`.
     """
     label, quality = scan_label(
         scan.mesh,
@@ -205,7 +208,7 @@ def build_scan(
         functional=scan.functional,
         textured=scan.texture is not None,
         texture=scan.texture,
-        stated=type_stated,
+        type_checked=type_checked,
     )
     measured = Asset(
         folder=folder,

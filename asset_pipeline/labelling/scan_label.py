@@ -36,7 +36,7 @@ def scan_label(
     functional: Float[np.ndarray, "3"] | None = None,
     textured: bool = True,
     texture: Path | None = None,
-    stated: bool = False,
+    type_checked: bool = False,
 ) -> tuple[PoseLabel, LabelQuality]:
     """The label frame of a scan, by the rules of the conventions, and how sure it is.
 
@@ -54,8 +54,8 @@ def scan_label(
       functional: `(3,)`, roughly from grip to functional end, in the mesh frame, where it is known.
       textured: Whether the asset has a texture, which may break symmetries of the shape.
       texture: Its image, to measure which; without, it is taken to leave turns about an axis only.
-      stated: Whether a person said the type of this object: where it is axial, and the shape has no axis of
-        revolution, that counts against the confidence.
+      type_checked: Whether the type is to be checked against the shape, as what a person or a file's name says of
+        one object: where it is axial, and the shape has no axis of revolution, that counts against the confidence.
 
     Raises:
       InputError: Another object type, which scans do not have, or no `up` where it is needed.
@@ -77,7 +77,7 @@ def scan_label(
     else:
         up = np.asarray(up, float) / np.linalg.norm(up)
         label, quality = _upright_label(cloud, object_type, up, category)
-        if stated and label.object_type == "axial" and "axis" not in quality.residuals:
+        if type_checked and label.object_type == "axial" and "axis" not in quality.residuals:
             confidence = min(quality.confidence, axis_evidence(cloud, up))
             quality = replace(quality, confidence=confidence)
     if textured:

@@ -68,7 +68,7 @@ def test_a_box_that_is_said_to_be_axial_is_laid_like_a_box():
     ids=["box", "cylinder"],
 )
 def test_an_axis_that_a_person_states_and_the_shape_lacks_leaves_no_confidence(solid, least, most):
-    _, quality = scan_label(_scan_of(solid), "axial", UP, textured=False, stated=True)
+    _, quality = scan_label(_scan_of(solid), "axial", UP, textured=False, type_checked=True)
     assert least <= quality.confidence <= most
 
 

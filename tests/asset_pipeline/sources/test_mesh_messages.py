@@ -201,16 +201,26 @@ def test_a_type_that_does_not_fit_is_told(tmp_path, caplog):
     )
 
 
-def test_an_axis_that_is_not_found_is_told_and_leaves_no_confidence(tmp_path):
-    _box(tmp_path / "tin.stl")
-    said = MeshOptions("tin", "axial", "z", "m", "CC0 1.0")
-    (result,) = build("meshes", tmp_path / "tin.stl", tmp_path / "out", said=said)
+@pytest.mark.parametrize(
+    ("name", "category", "object_type", "by"),
+    [
+        ("tin", "tin", "axial", "--type axial"),
+        ("thin_plate", None, None, "category plate by its name"),
+    ],
+)
+def test_an_axis_that_is_not_found_is_told_and_leaves_no_confidence(
+    name, category, object_type, by, tmp_path
+):
+    _box(tmp_path / f"{name}.stl")
+    said = MeshOptions(category, object_type, "z", "m", "CC0 1.0")
+    (result,) = build("meshes", tmp_path / f"{name}.stl", tmp_path / "out", said=said)
     assert result.status == "built", result.reason
     asset = read_asset(result.folder)
     assert asset.label.object_type == "axial" and not asset.label.symmetry.axial
     assert asset.label_quality is not None and asset.label_quality.confidence < 0.1
     (told,) = [w for w in result.warnings if "--type" in w]
-    assert told.endswith("no axis of revolution was found; labelled by planes: say --type mirror")
+    expected = f"{by}: no axis of revolution was found; labelled by planes: say --type mirror"
+    assert told.endswith(expected)
 
 
 @pytest.mark.full
