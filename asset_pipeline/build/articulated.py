@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from asset_pipeline.build.drawn_handle import with_handle
 from asset_pipeline.build.emit import write_asset
-from asset_pipeline.build.link_shapes import HANDLE, link_shapes
+from asset_pipeline.build.link_shapes import link_shapes
 from asset_pipeline.build.link_visuals import Textures, link_visuals
 from asset_pipeline.geometry.mass import shape_mass_properties
 from asset_pipeline.labelling.articulated_label import articulated_label
 from asset_pipeline.labelling.cavities import cavity_behind
 from asset_pipeline.labelling.handle_label import handle_label
-from asset_pipeline.sources.articulated_scan import ArticulatedScan, LinkRole, PartMesh, ScanLink
+from asset_pipeline.sources.articulated_scan import HANDLE, ArticulatedScan, LinkRole, ScanLink
+from asset_pipeline.sources.drawn_handle import face_normal, mesh_bounds, with_handle
 from manipose_mj.assets.asset import Asset, Cavity, MovingPart
 from manipose_mj.assets.geometry import Body, Joint, MassProperties, Shape
 from manipose_mj.assets.label import PoseLabel
@@ -62,10 +62,12 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
 
     A moving part makes no contact with the base, nor with a part whose bounding box is within 1 cm of
     its own while both are shut: drawn doors and carcasses overlap by millimetres. Both still collide with all else.
-    A handle that is drawn as one part with its door becomes a part of its own. Knobs become hinges of one full
-    turn, and buttons slides without a spring; none of them, nor a tray, has a handle.
+    A handle that is drawn as one part with its door becomes a part of its own, and a knob that nobody turns a handle.
+    Links that are knobs become hinges of one full turn, and buttons slides without a spring; none of them, nor a tray,
+    has a handle.
     """
-    scan = replace(scan, moving=tuple(_with_handle(link, scan.base) for link in scan.moving))
+    base = mesh_bounds([part.mesh for part in scan.base.parts])
+    scan = replace(scan, moving=tuple(with_handle(link, base) for link in scan.moving))
     links = (scan.base, *scan.moving)
     shapes = {link.name: link_shapes(link) for link in links}
     flat = {name: [s for group in own.values() for s in group] for name, own in shapes.items()}
@@ -88,7 +90,7 @@ def build_articulated(scan: ArticulatedScan, folder: Path) -> Asset:
                 )
             )
             if joint is not None:
-                outwards = _outwards(link, boxes["base"])
+                outwards = face_normal(link, boxes["base"])
                 handle = _handle(link, outwards)
                 cavity = _cavity(link, flat, boxes, outwards)
                 parts.append(MovingPart(link.name, joint, handle, cavity))
@@ -169,25 +171,6 @@ def _excluded(
     return (scan.base.name, *near)
 
 
-def _outwards(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "3"]:
-    """Off the part's face: a drawer's way out; a panel's normal, away from the middle of the base."""
-    assert link.joint is not None
-    if link.role == "drawer":
-        axis = int(np.abs(link.joint.axis).argmax())
-        sign = np.sign(link.joint.axis[axis])
-    else:
-        panel = _mesh_bounds([p for p in link.parts if p.name != HANDLE] or list(link.parts))
-        axis = int(np.ptp(panel, axis=0).argmin())
-        sign = np.sign(panel.mean(axis=0)[axis] - base.mean(axis=0)[axis]) or -1.0
-    return sign * np.eye(3)[axis]
-
-
-def _with_handle(link: ScanLink, base: ScanLink) -> ScanLink:
-    if link.role not in ("door", "drawer"):
-        return link
-    return with_handle(link, _outwards(link, _mesh_bounds(list(base.parts))))
-
-
 def _handle(link: ScanLink, outwards: Float[np.ndarray, "3"]) -> PoseLabel | None:
     """The label of the largest handle of what opens."""
     handles = [p.mesh for p in link.parts if p.name == HANDLE]
@@ -218,9 +201,4 @@ def _cavity(
 
 def _bounds(shapes: list[Shape]) -> Float[np.ndarray, "2 3"]:
     bounds = np.array([s.surface().bounds for s in shapes])
-    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
-
-
-def _mesh_bounds(parts: list[PartMesh]) -> Float[np.ndarray, "2 3"]:
-    bounds = np.array([p.mesh.bounds for p in parts])
     return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])

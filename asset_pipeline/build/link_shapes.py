@@ -10,10 +10,9 @@ from scipy.sparse.csgraph import connected_components
 from asset_pipeline.geometry.box_fit import box_between, fitted_box, fitted_hull
 from asset_pipeline.geometry.cell_boxes import cell_boxes
 from asset_pipeline.geometry.slab_hulls import SPACING, slab_hulls
-from asset_pipeline.sources.articulated_scan import PartMesh, ScanLink
+from asset_pipeline.sources.articulated_scan import HANDLE, PartMesh, ScanLink
 from manipose_mj.assets.geometry import Shape
 
-HANDLE = "handle"
 # Cells are this share of a link's longest side, within limits [m]; flat walls come out exact anyway.
 CELL_SHARE = 1 / 110
 CELL_RANGE = (0.003, 0.008)

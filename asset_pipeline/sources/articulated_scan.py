@@ -14,6 +14,7 @@ from manipose_mj.assets.asset import Provenance
 
 # What a moving link is for: a knob turns, a button gives way, a tray turns or slides inside; none of them opens anything.
 LinkRole = Literal["door", "drawer", "lid", "knob", "button", "tray"]
+HANDLE = "handle"  # what a part is named that is held to open a link
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import trimesh
 from jaxtyping import Float
 
 from asset_pipeline.sources.articulated_scan import LinkJoint, LinkRole, PartMesh, ScanLink, Surface
+from asset_pipeline.sources.drawn_handle import is_knob
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_size, pose_of
 from asset_pipeline.sources.partnet_mobility.roles import named_role, shaped_role
 from asset_pipeline.sources.partnet_mobility.sizes import CategorySize, likely_scale
@@ -27,6 +28,7 @@ log = logging.getLogger(__name__)
 FULL_TURN = 2 * np.pi
 MOVES = ("revolute", "prismatic", "continuous")
 MIN_TRAVEL = {"slide": 5e-4, "hinge": np.deg2rad(1.0)}  # [m, rad]; less is as good as fixed
+CONTROL = "control"  # what a knob is called that has a joint of its own on a door or a drawer
 MAX_SIZE = 4.0  # [m]
 _ROUNDED = 0.01  # what a whole turn may be written as more than it is
 _SMALLER = 0.999  # boxes that differ by less are alike
@@ -61,7 +63,10 @@ def normalised_links(
         top = moving[0].child if moving else urdf.root
         if moving:
             joints[top] = moving[0]
-        groups.setdefault(top, []).extend(_parts(folder, urdf, link, lacking))
+        parts = _parts(folder, urdf, link, lacking)
+        if len(moving) > 1:  # what turns on a door is no handle of it
+            parts = [replace(p, name=CONTROL) if is_knob(p) else p for p in parts]
+        groups.setdefault(top, []).extend(parts)
     if lacking:
         more = f" and {len(lacking) - 1} more like it" if len(lacking) > 1 else ""
         log.warning("%s%s; drawn in plain colours", lacking[0], more)

@@ -12,9 +12,9 @@ from asset_pipeline.sources.articulated_scan import LinkRole
 
 # Of what slides, and of what turns.
 _SLIDES: dict[str, LinkRole] = {
+    "drawer": "drawer",  # it may have a part named knob
     "button": "button", "knob": "button", "switch": "button",
     "tray": "tray", "rack": "tray", "grid": "tray", "shelf": "tray", "turntable": "tray",
-    "drawer": "drawer",
 }  # fmt: skip
 _TURNS: dict[str, LinkRole] = {
     "door": "door", "lid": "lid", "cover": "lid",

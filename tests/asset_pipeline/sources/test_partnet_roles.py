@@ -22,6 +22,7 @@ SLIDES, TURNS = True, False
         (SLIDES, "drawer", ["drawer_front", "knob"], "drawer"),
         (SLIDES, "tray", ["tray"], "tray"),
         (SLIDES, "translation_door", ["cabinet_door_surface", "knob"], "door"),
+        (SLIDES, "", ["drawer_front", "knob"], "drawer"),
         (SLIDES, "", ["cabinet_door_surface"], None),
     ],
 )
