@@ -103,6 +103,34 @@ def with_handle(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> ScanLink:
     )
 
 
+def body_bounds(link: ScanLink, base: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "2 3"] | None:
+    """Lowest and highest corner of a link without its handle, named or not, and without what carries it there.
+
+    Args:
+      link: Base or moving link, shut, in metres.
+      base: Lowest and highest corner of the base [m].
+
+    Returns:
+      `(2, 3)` [m]; None of a link that is nothing but a handle.
+    """
+    found = with_handle(link, base)
+    meshes = [part.mesh for part in found.parts if part.name != HANDLE]
+    if found is not link:  # then posts, and a knob's neck, may not be named either
+        outwards = face_normal(link, base)
+        front = _front([part for part in link.parts if not _words(part) & NO_BODY], outwards)
+        assert front is not None
+        around = mesh_bounds([part.mesh for part in found.parts if part.name == HANDLE])
+        around = (around + [[-CLEAR], [CLEAR]])[:, outwards == 0]
+        for mesh in meshes:
+            corners = np.asarray(mesh.triangles)
+            beside = corners[:, :, outwards == 0]
+            behind = ((beside >= around[0]) & (beside <= around[1])).all(axis=(1, 2))
+            mesh.update_faces(~(behind & ((corners @ outwards).max(axis=1) > front + CLEAR)))
+            mesh.remove_unreferenced_vertices()
+        meshes = [mesh for mesh in meshes if len(mesh.faces)]
+    return mesh_bounds(meshes) if meshes else None
+
+
 def _cut(
     parts: Sequence[PartMesh], outwards: Float[np.ndarray, "3"], front: float
 ) -> tuple[list[PartMesh], PartMesh | None]:

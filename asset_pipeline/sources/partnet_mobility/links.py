@@ -13,8 +13,15 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from asset_pipeline.sources.articulated_scan import LinkJoint, LinkRole, PartMesh, ScanLink, Surface
-from asset_pipeline.sources.drawn_handle import is_knob
+from asset_pipeline.sources.articulated_scan import (
+    HANDLE,
+    LinkJoint,
+    LinkRole,
+    PartMesh,
+    ScanLink,
+    Surface,
+)
+from asset_pipeline.sources.drawn_handle import body_bounds, is_knob
 from asset_pipeline.sources.partnet_mobility.record import Semantics, compare_size, pose_of
 from asset_pipeline.sources.partnet_mobility.roles import named_role, shaped_role
 from asset_pipeline.sources.partnet_mobility.sizes import CategorySize, likely_scale
@@ -32,6 +39,7 @@ CONTROL = "control"  # what a knob is called that has a joint of its own on a do
 MAX_SIZE = 4.0  # [m]
 _ROUNDED = 0.01  # what a whole turn may be written as more than it is
 _SMALLER = 0.999  # boxes that differ by less are alike
+_LARGER = 1 + 1e-9  # scales that differ by less are one
 _BOTH_SIDES = (
     0.1  # of a range on either side of where a part is drawn, from which on that is no slip
 )
@@ -104,13 +112,13 @@ def placed_links(
       InputError: The object is flat, or would be gigantic.
     """
     base, moving = links
-    bodies = [p.mesh for link in (base, *moving) for p in link.parts if p.name != "handle"]
+    bodies = [p.mesh for link in (base, *moving) for p in link.parts if p.name != HANDLE]
     low = np.min([m.bounds[0] for m in bodies], axis=0)
     high = np.max([m.bounds[1] for m in bodies], axis=0)
     extents = high - low
     if not (np.isfinite(extents).all() and extents.min() > 1e-6):
         raise InputError(f"the object measures {extents}; expected a solid thing")
-    scale = likely_scale(extents, size.builds)
+    scale = _scale(base, moving, extents, size)
     everything = np.array([p.mesh.bounds for link in (base, *moving) for p in link.parts])
     whole = scale * (everything[:, 1].max(axis=0) - everything[:, 0].min(axis=0))
     if whole.max() > MAX_SIZE:
@@ -137,6 +145,28 @@ def placed_links(
         else:
             kept.append(placed)
     return _scaled(replace(base, parts=tuple(frozen)), scale, foot), kept
+
+
+def _scale(
+    base: ScanLink, moving: list[ScanLink], extents: Float[np.ndarray, "3"], size: CategorySize
+) -> float:
+    """The length of the drawing's unit [m]; `extents` are those of all that is not named a handle.
+
+    What the build will take for handles does not count as furniture's depth. Of appliances another side is known, or all
+    three, and the depth of an oven varies by more.
+    """
+    scale = likely_scale(extents, size.builds)
+    while not size.appliance:
+        # A larger scale may show another handle, and never one less.
+        links = [_scaled(link, scale, np.zeros(3)) for link in (base, *moving)]
+        whole = _bounds(links[0])
+        bodies = [own for link in links if (own := body_bounds(link, whole)) is not None]
+        deep = np.max(bodies, axis=0)[1] - np.min(bodies, axis=0)[0]
+        larger = scale * likely_scale(deep, size.builds)
+        if larger <= _LARGER * scale:
+            break
+        scale = larger
+    return scale
 
 
 def moved(part: PartMesh, pose: Float[np.ndarray, "4 4"], scale: float = 1.0) -> PartMesh:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 
 class Length(NamedTuple):
-    """Of one side of the bounding box, everything shut, named handles left out: the mean [m], and how much it varies
+    """Of one side of the bounding box, everything shut, handles left out (of appliances, those with that name): the mean [m], and how much it varies
     as a share of it."""
 
     mean: float

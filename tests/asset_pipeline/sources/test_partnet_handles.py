@@ -64,14 +64,38 @@ def _built(folder: Path, more: Boards, **links: tuple[str, str, Boards]) -> Asse
 
 
 def test_a_knob_that_belongs_to_a_drawer_is_its_handle(tmp_path):
-    named = _built(tmp_path / "handle", [("handle-22", *BALL), ("post-23", *POST)])
-    asset = _built(tmp_path / "knob", [("knob-22", *BALL), ("post-23", *POST)])
+    named = _built(tmp_path / "handle", [("handle-22", *BALL), ("handle-22", *POST)])
+    asset = _built(tmp_path / "knob", [("knob-22", *BALL), ("knob-22", *POST)])
     handle, expected = asset.part("drawer_1").handle, named.part("drawer_1").handle
     assert handle is not None and expected is not None
     np.testing.assert_allclose(handle.rotation, expected.rotation, atol=1e-9)
-    assert handle.origin[1] == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(handle.extents, expected.extents, atol=1e-6)
+    np.testing.assert_allclose(handle.origin, expected.origin, atol=1e-6)
 
 
 def test_a_knob_that_turns_on_a_drawer_is_no_handle(tmp_path):
     lock = ("link_1", "hinge", [("knob-22", *BALL), ("knob-22", *POST)])
     assert _built(tmp_path, [], link_2=lock).part("drawer_1").handle is None
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        [],
+        [("handle-22", *BALL), ("handle-22", *POST)],
+        [("knob-22", *BALL), ("knob-23", *POST)],
+        [("knob-22", *BALL), ("post-23", *POST)],
+        [("front-4", *BALL), ("front-4", *POST)],
+        [("piece-22", *BAR), *(("front-4", *post) for post in POSTS)],
+    ],
+    ids=["none", "named", "knob", "post", "one with the front", "bar"],
+)
+def test_a_handle_is_no_depth_of_furniture(tmp_path, more):
+    drawer = ("base", "slider", [*DRAWER, *more])
+    (item,) = partnet_mobility.items(_drawn(tmp_path / "chest", {"link_1": drawer}))
+    with partnet_mobility.opened(item) as scan:
+        (opened,) = scan.moving
+        width = np.ptp([p.mesh.bounds for p in scan.base.parts], axis=(0, 1))[1]
+    assert opened.joint is not None
+    assert width == pytest.approx(0.42 / 1.04)  # with its front the chest is 1.04 deep, and 1 wide
+    assert opened.joint.travel == pytest.approx(0.6 * 0.42 / 1.04)
