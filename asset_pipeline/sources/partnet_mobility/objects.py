@@ -40,8 +40,13 @@ def items(path: Path) -> list[ScanItem]:
     """The objects at `path`: one object's folder, a folder of them, or of `dataset/`, or an archive.
 
     Raises:
-      InputError: `path` does not exist or holds no object.
+      InputError: `path` does not exist or holds no object, or is a URDF and not its folder.
     """
+    if path.is_file() and path.suffix.lower() == ".urdf":
+        name = "" if path.name == URDF else f"; name it {URDF} there"
+        raise InputError(
+            f"{path}: is one file of an object; expected the folder that it is in{name}"
+        )
     return collection.find_items(
         path,
         what="PartNet-Mobility",

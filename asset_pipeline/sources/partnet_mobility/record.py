@@ -50,10 +50,12 @@ class Semantics:
 
 
 def compare_links(folder: Path, urdf: Urdf, semantics: dict[str, Semantics]) -> None:
-    """Log where `mobility_v2.json`, `semantics.txt` and the URDF disagree."""
+    """Log where `mobility_v2.json`, where it is there, `semantics.txt` and the URDF disagree."""
     for mismatch in (*_placements(urdf), *_semantics(urdf, semantics)):
         log.warning("%s: %s", folder, mismatch)
     path = folder / "mobility_v2.json"
+    if not path.is_file():
+        return
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         entries = {f"link_{entry['id']}": entry for entry in document}

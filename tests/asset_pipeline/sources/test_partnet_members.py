@@ -10,6 +10,7 @@ import pytest
 import trimesh
 
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
+from manipose_mj.errors import InputError
 
 VISUAL = '<visual name="{0}"><geometry><mesh filename="{1}"/></geometry></visual>'
 FILES = {
@@ -68,3 +69,24 @@ def test_an_archive_gives_all_that_its_urdf_names(drawn, tmp_path):
 def test_a_urdf_that_cannot_be_read_is_still_an_input(drawn):
     (drawn / "mobility.urdf").write_text("<robot>")
     assert "mobility.urdf" in _inputs(drawn)
+
+
+def test_a_record_that_is_not_there_is_not_compared(drawn, caplog):
+    assert not (drawn / "mobility_v2.json").exists()
+    (item,) = partnet_mobility.items(drawn)
+    with partnet_mobility.opened(item):
+        pass
+    assert "mobility_v2.json" not in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("mobility.urdf", "is one file of an object; expected the folder that it is in$"),
+        ("chest.urdf", "expected the folder that it is in; name it mobility.urdf there$"),
+    ],
+)
+def test_a_urdf_in_place_of_its_folder_is_told(drawn, name, message):
+    path = (drawn / "mobility.urdf").rename(drawn / name)
+    with pytest.raises(InputError, match=message):
+        partnet_mobility.items(path)
