@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
+from asset_pipeline.geometry.surface_points import surface_points
 from asset_pipeline.labelling.overrides.other_axes import require_on_axis, symmetries_along
 from asset_pipeline.labelling.overrides.reading import FrameOverride, Override, PartOverride
 from asset_pipeline.labelling.scan_label import scan_label
@@ -20,10 +22,16 @@ from manipose_mj.assets.label_quality import LabelQuality
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.poses import SymmetryGroup, compose, invert, rotation_about, transform
 
+log = logging.getLogger(__name__)
+
 # In lengths of an object's diagonal: from its middle its label's origin, from its box a handle or a hinge can be.
 _FARTHEST = 3
 _DENSEST = 22_600.0  # of all matter: osmium [kg/m^3]
 _LIGHTEST = 1.2  # air
+_BESIDE, _SPACING = (
+    0.01,
+    0.0025,
+)  # of a handle's box from what is seen, at most; of points there [m]
 
 
 def overridden(
@@ -141,6 +149,18 @@ def _check_length(extents: Float[np.ndarray, "3"], surface: trimesh.Trimesh, whe
         )
 
 
+def _is_seen(label: PoseLabel, surface: trimesh.Trimesh) -> bool:
+    """Whether some of the surface is in the label's box or beside it."""
+    most = label.extents / 2 + _BESIDE
+    own = (np.asarray(surface.vertices) - label.origin) @ label.rotation
+    corners = own[np.asarray(surface.faces)]
+    near = ((corners.min(axis=1) <= most) & (corners.max(axis=1) >= -most)).all(axis=1)
+    if not near.any():
+        return False
+    mesh = trimesh.Trimesh(own, np.asarray(surface.faces)[near], process=False)
+    return bool((np.abs(surface_points(mesh, _SPACING)) <= most).all(axis=1).any())
+
+
 def moved(label: PoseLabel, frame: FrameOverride) -> PoseLabel:
     """The label with another frame or symmetry; its extents are those of the old box in the new axes.
 
@@ -232,6 +252,12 @@ def _part(override: Override, part: MovingPart, surface: trimesh.Trimesh) -> Mov
         handle = _moved(found, said.handle, f"{where}: handle")
         _check_near(handle.origin, surface, f"{where}: handle: origin")
         _check_length(handle.extents, surface, f"{where}: handle: extents")
+        if not _is_seen(handle, surface):
+            log.warning(
+                "%s: handle: nothing of the object is within %g mm of it; expected it where a handle is seen",
+                where,
+                1e3 * _BESIDE,
+            )
     if said.joint_origin is not None:
         _check_near(said.joint_origin, surface, f"{where}: joint: origin")
         joint = replace(joint, origin=said.joint_origin)

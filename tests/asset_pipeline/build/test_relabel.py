@@ -163,3 +163,13 @@ def test_millimetres_of_parts_are_told_before_anything_is_written(tmp_path, entr
     with pytest.raises(InputError, match=f"cupboard: parts: drawer: {message}.*; expected metres"):
         relabel(asset.folder, labels)
     assert {p: p.read_bytes() for p in asset.folder.rglob("*") if p.is_file()} == before
+
+
+@pytest.mark.parametrize("away", [0.0, 0.009, 0.05])
+def test_a_handle_where_nothing_is_seen_is_told(tmp_path, caplog, away):
+    asset = made.cupboard(tmp_path / "cupboard")  # its front is at x = -0.03
+    bar = f"{{origin: [{-0.04 - away}, 0, 0.05], x: [0, 0, 1], y: [-1, 0, 0], extents: [0.03, 0.02, 0.02]}}"
+    labels = _labels(tmp_path, f"cupboard: {{parts: {{door: {{handle: {bar}}}}}}}\n")
+    relabel(asset.folder, labels)
+    told = f"{labels}: cupboard: parts: door: handle: nothing of the object is within 10 mm of it"
+    assert (told in caplog.text) == (away > 0.01)
