@@ -41,14 +41,14 @@ from manipose_mj.storage.staging import made_for_result
 
 log = logging.getLogger(__name__)
 
-OWN = "meshes"
+OWN, FURNITURE = "meshes", "partnet_mobility"
 # A source is a module with `items(path)`, `inputs(item)` and the context manager `opened(item)`.
 SOURCES: dict[str, ModuleType] = {
     "google_scanned_objects": google_scanned_objects,
     OWN: meshes,
     "omniobject3d": omniobject3d,
     "pace": pace,
-    "partnet_mobility": partnet_mobility,
+    FURNITURE: partnet_mobility,
     "ycb": ycb,
 }
 # To be raised with every change that alters what is built.
@@ -68,6 +68,7 @@ def build(
     limits: Limits = DEFAULT_LIMITS,
     labels: Path | None = None,
     said: MeshOptions | None = None,
+    licence: str | None = None,
     progress: Callable[[BuildResult, int], None] | None = None,
 ) -> list[BuildResult]:
     """Build every object at `path` into `out/<name>`.
@@ -86,6 +87,7 @@ def build(
       labels: A person's labels, which override what is measured; see `labelling.overrides`. None:
         `labels.yaml` in `out`, where there is one.
       said: What is known of own meshes, the source `"meshes"`; the others know it themselves.
+      licence: Of one's own furniture, read by the source `"partnet_mobility"`; None is the data set's.
       progress: Called with each result and the number of objects in all.
 
     Returns:
@@ -101,9 +103,13 @@ def build(
         said = said or MeshOptions()
     elif said is not None:
         raise InputError(f"{source} knows its objects; options are for the source {OWN!r} only")
+    if licence is not None and source != FURNITURE:
+        raise InputError(f"{source} has its licence; this one is for the source {FURNITURE!r} only")
     # Objects are built in processes with other working directories.
     path, out = Path(path).absolute(), Path(out).absolute()
-    found = {item.name: item for item in _items(source, path, limits, said)}
+    found = {
+        item.name: item for item in _items(source, path, limits, licence if said is None else said)
+    }
     for name in only:
         if name not in found:
             raise unknown_name(f"object in {path}", name, found)
@@ -340,7 +346,9 @@ def _overrides(labels: Path | None, out: Path, found: dict[str, ScanItem]) -> di
     return overrides
 
 
-def _items(source: str, path: Path, limits: Limits, said: MeshOptions | None) -> list[ScanItem]:
+def _items(
+    source: str, path: Path, limits: Limits, said: MeshOptions | str | None
+) -> list[ScanItem]:
     """What the source finds, looking into archives under the same limits."""
     with tempfile.TemporaryDirectory(prefix="manipose-list-") as scratch:
         arguments = (path,) if said is None else (path, said)

@@ -16,6 +16,7 @@ LONGEST = 1e6  # that a scan may take [s]: eleven days
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Type = Literal["axial", "mirror", "functional"]
 _MESHES = "(meshes only)"
+_LICENSED = "(meshes and partnet_mobility only)"
 
 
 def build_assets(
@@ -35,7 +36,7 @@ def build_assets(
     unit: Annotated[
         str | None, arg(metavar="m|cm|mm|in|ft|NUMBER", help_behavior_hint=_MESHES)
     ] = None,
-    licence: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint=_MESHES)] = None,
+    licence: Annotated[str | None, arg(metavar="TEXT", help_behavior_hint=_LICENSED)] = None,
     object_type: Annotated[Type | None, arg(name="type", help_behavior_hint=_MESHES)] = None,
 ) -> int:
     """Build assets from scans: labels, convex parts, mass, stable poses, grasps, MJCF.
@@ -61,22 +62,24 @@ def build_assets(
       category: What kind of object the meshes are, such as mug; without it by the file's name.
       up: Axis that points up when the object stands; without it guessed.
       unit: Of the mesh's coordinates, also as a number of metres; without it guessed.
-      licence: Under which the meshes may be used; without it the assets say that it is unknown.
+      licence: Under which the meshes may be used; without it the assets say that it is unknown. Also of your own
+        furniture in the layout of partnet_mobility; without it that data set's.
       object_type: Rule of the label; without it the category's.
     """
     prepare_workers(jobs)
-    from asset_pipeline.build.data_set import OWN, SOURCES, BuildResult, build
+    from asset_pipeline.build.data_set import FURNITURE, OWN, SOURCES, BuildResult, build
     from asset_pipeline.build.workers.limited_call import Limits
     from asset_pipeline.catalogue.parallel_build import build_catalogue
     from asset_pipeline.sources.meshes import MeshOptions
     from manipose_mj.console import output
     from manipose_mj.errors import unknown_name
 
-    said = MeshOptions(category, object_type, up, unit, licence)
+    own_licence = licence if source == FURNITURE else None
+    said = MeshOptions(category, object_type, up, unit, licence if own_licence is None else None)
     if source != OWN and said != MeshOptions():
         raise InputError(
-            "--category, --up, --unit, --licence and --type are for meshes; "
-            f"leave them out, {source} knows its objects"
+            "--category, --up, --unit, --licence and --type are for meshes, --licence for "
+            f"{FURNITURE} too; leave them out, {source} knows its objects"
         )
     if beyond and source != CATALOGUE:
         raise InputError(f"--beyond is for {CATALOGUE}; leave it out, {source} has what PATH holds")
@@ -114,6 +117,7 @@ def build_assets(
                 limits=limits,
                 labels=labels,
                 said=said if source == OWN else None,
+                licence=own_licence,
                 progress=show,
             )
     failed = [r for r in results if r.status == "failed"]

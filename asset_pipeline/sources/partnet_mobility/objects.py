@@ -13,7 +13,7 @@ import logging
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from glob import escape
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -34,10 +34,23 @@ SOURCE = "PartNet-Mobility v2"
 LICENCE = "PartNet-Mobility terms of use: non-commercial research, no redistribution"
 URDF = "mobility.urdf"
 FILES = (URDF, "mobility_v2.json", "semantics.txt", "meta.json", "bounding_box.json")
+# In an asset's inputs: what was said of it.
+SAID = "as said"
 
 
-def items(path: Path) -> list[ScanItem]:
+@dataclass(frozen=True)
+class FurnitureItem(ScanItem):
+    """An object, and the licence that was said of it; None is the data set's."""
+
+    licence: str | None = None
+
+
+def items(path: Path, licence: str | None = None) -> list[FurnitureItem]:
     """The objects at `path`: one object's folder, a folder of them, or of `dataset/`, or an archive.
+
+    Args:
+      path: The folder or archive.
+      licence: Of one's own objects in this layout, under which they may be used.
 
     Raises:
       InputError: `path` does not exist or holds no object, or is a URDF and not its folder.
@@ -47,22 +60,24 @@ def items(path: Path) -> list[ScanItem]:
         raise InputError(
             f"{path}: is one file of an object; expected the folder that it is in{name}"
         )
-    return collection.find_items(
+    found = collection.find_items(
         path,
         what="PartNet-Mobility",
         meshes=(URDF, f"*/{URDF}", f"dataset/*/{URDF}"),
         name=lambda root, urdf: collection.folder_name(root, urdf.parent),
         inside=("*.zip",),
     )
+    return [FurnitureItem(item.name, item.path, item.member, licence) for item in found]
 
 
-def inputs(item: ScanItem) -> dict[str, str]:
-    """The sha256 of every file that the object is built from, keyed by file name."""
-    return collection.hashes(item, _members(item))
+def inputs(item: FurnitureItem) -> dict[str, str]:
+    """The sha256 of every file that the object is built from, keyed by file name; and the licence that was said."""
+    said = {SAID: f"licence={item.licence}"} if item.licence else {}
+    return collection.hashes(item, _members(item)) | said
 
 
 @contextmanager
-def opened(item: ScanItem) -> Iterator[ArticulatedScan]:
+def opened(item: FurnitureItem) -> Iterator[ArticulatedScan]:
     """Read one object; its textures stay there as long as the context does.
 
     Raises:
@@ -98,7 +113,7 @@ def _named_meshes(item: ScanItem) -> list[PurePosixPath]:
         return []
 
 
-def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:
+def _scan(item: FurnitureItem, folder: Path) -> ArticulatedScan:
     semantics = _semantics(folder)
     size = _size(folder, semantics)
     urdf = read_urdf(folder / URDF)
@@ -110,7 +125,7 @@ def _scan(item: ScanItem, folder: Path) -> ArticulatedScan:
         base=base,
         moving=tuple(_named(moving)),
         appliance=size.appliance,
-        provenance=Provenance(SOURCE, item.name, LICENCE, inputs(item)),
+        provenance=Provenance(SOURCE, item.name, item.licence or LICENCE, inputs(item)),
     )
 
 

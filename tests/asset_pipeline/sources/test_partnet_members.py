@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from asset_pipeline.build.data_set import build
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
+from manipose_mj.assets.asset_json import read_asset
+from manipose_mj.cli.main import main
 from manipose_mj.errors import InputError
 
 VISUAL = '<visual name="{0}"><geometry><mesh filename="{1}"/></geometry></visual>'
@@ -90,3 +93,21 @@ def test_a_urdf_in_place_of_its_folder_is_told(drawn, name, message):
     path = (drawn / "mobility.urdf").rename(drawn / name)
     with pytest.raises(InputError, match=message):
         partnet_mobility.items(path)
+
+
+def test_own_furniture_has_the_licence_that_is_said(drawn, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["assets", "build", "partnet_mobility", str(drawn), "--out", str(out), "--jobs", "1"]
+    said = [*command, "--licence", "CC0 1.0"]
+    for options, status, licence in (
+        (command, "1 built", partnet_mobility.LICENCE),
+        (said, "1 built", "CC0 1.0"),
+        (said, "0 built, 1 up to date", "CC0 1.0"),
+    ):
+        assert main(options) == 0
+        assert status in capsys.readouterr().out
+        assert read_asset(out / "4713").provenance.licence == licence
+    assert main([*command, "--category", "mug"]) != 0
+    assert "--licence for partnet_mobility too" in capsys.readouterr().err
+    with pytest.raises(InputError, match="ycb has its licence"):
+        build("ycb", drawn, out, licence="CC0 1.0")
