@@ -28,10 +28,8 @@ log = logging.getLogger(__name__)
 _FARTHEST = 3
 _DENSEST = 22_600.0  # of all matter: osmium [kg/m^3]
 _LIGHTEST = 1.2  # air
-_BESIDE, _SPACING = (
-    0.01,
-    0.0025,
-)  # of a handle's box from what is seen, at most; of points there [m]
+_BESIDE = 0.01  # of a handle's box from what is seen, at most [m]
+_SPACING = 0.0025  # of points there [m]
 
 
 def overridden(
