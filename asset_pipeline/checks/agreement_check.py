@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.geometry import Joint
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.assets.physics import COLLISION_GROUP
 
 PREFIX = "asset/"  # of names in `rest_scene`
 KINDS = ("free", "ball", "slide", "hinge")  # in the order of mjtJoint
@@ -77,15 +76,10 @@ def body_failures(asset: Asset, model: mujoco.MjModel) -> list[str]:
       model: Of `rest_scene`.
     """
     data = _at_rest(model)
-    own = np.flatnonzero(model.geom_bodyid > 0)
-    solid = own[model.geom_contype[own] > 0]
+    solid = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype > 0))
     failures = []
     if asset.kind == "rigid" and model.nbody > BASE:
         failures += _mass_differences(asset, model, data)
-        if len(solid) and not (model.geom_group[own] < COLLISION_GROUP).any():
-            failures.append(
-                f"model.xml has nothing to be seen: no geom is of a group below {COLLISION_GROUP}"
-            )
     if len(solid):
         labels = {"label": asset.label}
         labels |= {f"handle of {p.name!r}": p.handle for p in asset.parts if p.handle is not None}

@@ -66,7 +66,7 @@ def visual_matches(folder: Path) -> list[VisualMatch]:
     """The comparison of every body that has both visual and collision shapes.
 
     Raises:
-      InputError: The model or a mesh it names cannot be read.
+      InputError: The model or a mesh it names cannot be read, or nothing is to be seen.
     """
     seen, solid = visible_shapes(folder), collision_shapes(folder)
     return [_match(body, seen[body], solid[body]) for body in solid if solid[body] and seen[body]]
@@ -76,7 +76,7 @@ def visual_failures(folder: Path) -> list[str]:
     """A line for each body whose visual is not where its collision shapes are.
 
     Raises:
-      InputError: The model or a mesh it names cannot be read.
+      InputError: The model or a mesh it names cannot be read, or nothing is to be seen.
     """
     failures = []
     for match in visual_matches(folder):
