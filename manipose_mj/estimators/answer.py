@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from manipose_mj.ppf_jax.pose_estimate import PoseEstimate
+from manipose_mj.user_code import reason_of
 
 _RIGID = 1e-3  # how far a rotation may be from orthonormal
 _ROUNDING = 1e-6  # how far a score may be beyond 0 and 1
@@ -66,7 +67,7 @@ def _told(estimate: PoseEstimate) -> dict[str, Any]:
     try:
         if extents is not None and not np.isfinite(np.asarray(extents, float)).all():
             extents = None
-    except (TypeError, ValueError):
+    except Exception:
         pass  # no numbers, as any answer's may be: told where they are read
     return {"pose": estimate.pose, "score": estimate.confidence, "extents": extents}
 
@@ -104,6 +105,8 @@ def _array(
         value = np.array(given, float)
     except (TypeError, ValueError):
         raise EstimatorFailedError(f"{name} is not made of numbers") from None
+    except Exception as error:  # such as of a tensor that is elsewhere
+        raise EstimatorFailedError(f"{name} is no array: {reason_of(error)}") from error
     if value.shape != shape:
         raise EstimatorFailedError(f"{name} has shape {value.shape}; expected {shape}")
     if not np.isfinite(value).all():

@@ -92,7 +92,7 @@ class EstimatorService:
         mesh = observation.get("mesh")
         given = None if mesh is None else {name: np.array(values) for name, values in mesh.items()}
         try:
-            return checked_answer(self.estimator.estimate(observation), given)
+            answer = self.estimator.estimate(observation)
         except (ServerLostError, MemoryError):
             raise
         except EstimatorFailedError as error:
@@ -101,3 +101,7 @@ class EstimatorService:
             raise EstimatorFailedError(
                 f"estimator {self.name} raised {reason_of(error)}"
             ) from error
+        try:
+            return checked_answer(answer, given)  # raises another error only by a mistake of ours
+        except EstimatorFailedError as error:
+            raise EstimatorFailedError(f"estimator {self.name}: {error}") from error

@@ -177,6 +177,29 @@ def test_an_error_of_the_estimator_names_it_in_one_line():
         EstimatorService("mine", answers.Leaves()).estimate({})
 
 
+class _Tensor:
+    """As PyTorch's of which a gradient is wanted."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.")
+
+
+def test_an_answer_that_cannot_be_read_is_the_estimators():
+    told = PoseEstimate(np.eye(4), np.full(3, 0.1), 0.5)
+    object.__setattr__(told, "extents", _Tensor())
+    for answer, name in (({"pose": _Tensor(), "score": 1}, "pose"), (told, "extents")):
+        with pytest.raises(EstimatorFailedError, match=f"mine: {name} is no array: RuntimeError"):
+            EstimatorService("mine", answers.Says(answer)).estimate({})
+
+
+def test_a_mistake_of_ours_is_not_the_estimators():
+    empty = {"vertices": np.zeros((0, 3), np.float32), "faces": np.zeros((0, 3), np.int32)}
+    with pytest.raises(ValueError, match="zero-size array"):
+        EstimatorService("mine", answers.Says({"pose": IDENTITY, "score": 1})).estimate(
+            {"mesh": empty}
+        )
+
+
 def test_a_server_answers_as_the_same_estimator_in_process_does(views):
     here = EstimatorService("here", answers.Middle(0.4))
     served = answers.Middle(0.4)
