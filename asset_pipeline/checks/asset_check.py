@@ -23,6 +23,7 @@ from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
 from manipose_mj.assets.rest_scene import rest_scene
 from manipose_mj.errors import InputError
+from manipose_mj.mjcf.objects import scene_model
 from manipose_mj.poses import quaternion_to_rotation
 
 
@@ -120,6 +121,7 @@ def check_asset(folder: Path) -> CheckResult:
     try:
         asset = read_asset(folder)
         model = rest_scene(asset.model_path, plane=asset.kind == "rigid")
+        scene_model(asset)  # or tasks cannot take it
         unlike = visual_failures(folder)
     except InputError as error:
         return CheckResult(folder.name, (str(error),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 from dm_control import composer, mjcf
 from jaxtyping import Float, Int
@@ -11,19 +12,64 @@ from manipose_mj.assets.physics import SCENE_CONTACT_TIME
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
 
+# What a model may state of a compiler's settings to be attached to a scene as it is.
+_PLAIN = {"angle": "radian", "autolimits": "true"}
+_UNREADABLE = (
+    OSError,
+    ValueError,
+    LookupError,
+    SyntaxError,
+    mujoco.FatalError,
+)  # lxml's are SyntaxError
 
-def _read_model(asset: Asset) -> mjcf.RootElement:
+
+def scene_model(asset: Asset) -> mjcf.RootElement:
+    """An asset's MJCF without what is a scene's own: settings of compiler, options, sizes and looks.
+
+    Raises:
+      InputError: It cannot be read, or has a `<frame>`, which dm_control does not know.
+    """
+    place = f"{asset.place}/{MODEL_FILE}"
     try:
-        return mjcf.from_path(str(asset.model_path))
-    except (OSError, ValueError, SyntaxError) as error:  # lxml's are SyntaxError
-        line = " ".join(str(error).split())
-        raise InputError(f"{asset.place}/{MODEL_FILE}: cannot be read: {line}") from None
+        root = mjcf.from_path(str(asset.model_path))
+    except _UNREADABLE:
+        root = None  # dm_control knows less MJCF than MuJoCo, which has the last word
+    if root is None or not _is_plain(root):
+        try:
+            root = _rewritten(asset)
+        except _UNREADABLE as error:
+            line = " ".join(str(error).split())
+            raise InputError(f"{place}: cannot be read: {line}") from None
+    for own in (root.option, root.size, root.statistic, root.visual):
+        own.remove()
+    return root
 
 
-def _stiffen(root: mjcf.RootElement) -> None:
-    for geom in root.find_all("geom"):
+def _is_plain(root: mjcf.RootElement) -> bool:
+    stated = root.compiler.get_attributes()
+    return stated.get("angle") == "radian" and stated.items() <= _PLAIN.items()
+
+
+def _rewritten(asset: Asset) -> mjcf.RootElement:
+    """The model as MuJoCo writes it: in radians, inertias stated; only then scenes may forget its compiler's settings."""
+    spec = mujoco.MjSpec.from_file(str(asset.model_path))
+    if spec.frames:
+        raise ValueError("scenes take no <frame>; write its pose into what it holds")
+    spec.compiler.saveinertial = True
+    spec.compile()
+    root = mjcf.from_xml_string(spec.to_xml(), model_dir=str(asset.folder))
+    for setting in root.compiler.get_attributes():
+        if setting not in _PLAIN:
+            delattr(root.compiler, setting)
+    return root
+
+
+def stiffen(root: mjcf.RootElement, time: float) -> None:
+    """Give an object's contacts another time constant [s], where it or a class of its geoms states one."""
+    classes = [element.geom for element in root.find_all("default")]
+    for geom in (*classes, *root.find_all("geom")):
         if geom.solref is not None:
-            geom.solref = [SCENE_CONTACT_TIME, 1.0]
+            geom.solref = [time, 1.0]
 
 
 class RigidObject(composer.Entity):
@@ -33,9 +79,9 @@ class RigidObject(composer.Entity):
         if asset.kind != "rigid":
             raise InputError(f"{asset.place}: is an {asset.kind} asset; expected a rigid one")
         self.asset = asset
-        self._mjcf_root = _read_model(asset)
+        self._mjcf_root = scene_model(asset)
         self._mjcf_root.model = name or asset.name
-        _stiffen(self._mjcf_root)
+        stiffen(self._mjcf_root, SCENE_CONTACT_TIME)
         # The arena's attachment frame carries the free joint instead of the stand-alone model's.
         for joint in self._mjcf_root.find_all("joint"):
             joint.remove()
@@ -77,9 +123,9 @@ class ArticulatedObject(composer.Entity):
         if asset.kind != "articulated":
             raise InputError(f"{asset.place}: is a {asset.kind} asset; expected an articulated one")
         self.asset = asset
-        self._mjcf_root = _read_model(asset)
+        self._mjcf_root = scene_model(asset)
         self._mjcf_root.model = name or asset.name
-        _stiffen(self._mjcf_root)
+        stiffen(self._mjcf_root, SCENE_CONTACT_TIME)
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from manipose_mj.assets.asset import Asset
 from manipose_mj.errors import InputError
 from manipose_mj.mjcf.markers.goal_marker import GoalMarker
+from manipose_mj.mjcf.objects import stiffen
 from manipose_mj.poses import compose, rotation_about
 from manipose_mj.tasks.clutter.lying_pile import LyingPile
 from manipose_mj.tasks.clutter.pile import Pile
@@ -91,11 +92,9 @@ class Clutter(ManipulationTask):
         self._cache = PileCache(assets, config.pile)
 
     def _stiffen_contacts(self) -> None:
-        geoms = [self.scene.arena.mjcf_model.find("geom", "table")]
+        self.scene.arena.mjcf_model.find("geom", "table").solref = [PILE_CONTACT_TIME, 1.0]
         for entity in self.pool.entities:
-            geoms += [g for g in entity.mjcf_model.find_all("geom") if g.solref is not None]
-        for geom in geoms:
-            geom.solref = [PILE_CONTACT_TIME, 1.0]
+            stiffen(entity.mjcf_model, PILE_CONTACT_TIME)
 
     @abc.abstractmethod
     def choose_targets(
