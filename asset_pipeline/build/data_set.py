@@ -10,8 +10,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
-from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
 
 from asset_pipeline.build.articulated import build_articulated
@@ -305,14 +305,15 @@ def up_to_date(folder: Path, inputs: dict[str, str], generator: str) -> bool:
 def _is_whole(asset: Asset) -> bool:
     """Whether every file is there that a build writes beside `asset.json`."""
     try:
-        root = ElementTree.parse(asset.model_path).getroot()
-    except (OSError, ElementTree.ParseError):
+        spec = mujoco.MjSpec.from_file(str(asset.model_path))
+    except (ValueError, mujoco.FatalError):
         return False
-    files = [element.attrib["file"] for element in root.iter() if "file" in element.attrib]
+    files = [Path(spec.compiler.meshdir, mesh.file) for mesh in spec.meshes if mesh.file]
+    files += [Path(spec.compiler.texturedir, each.file) for each in spec.textures if each.file]
     if asset.kind == "rigid":
-        files.append(GRASPS_FILE)  # also where the gripper can hold it nowhere
+        files.append(Path(GRASPS_FILE))  # also where the gripper can hold it nowhere
     if OVERRIDE in asset.provenance.inputs:
-        files.append(MEASURED_FILE)
+        files.append(Path(MEASURED_FILE))
     return all((asset.folder / file).is_file() for file in files)
 
 

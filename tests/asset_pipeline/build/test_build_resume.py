@@ -142,6 +142,17 @@ def test_an_asset_that_lost_a_file_is_not_up_to_date(tmp_path, lost):
     assert not up_to_date(asset.folder, provenance.inputs, provenance.generator)
 
 
+def test_a_model_edited_by_hand_is_up_to_date_where_its_files_are_there(tmp_path):
+    asset = made.block(tmp_path / "block")
+    text = asset.model_path.read_text().replace('="meshes/', '="')
+    text = text.replace("<compiler ", '<compiler meshdir="meshes" texturedir="meshes" ')
+    asset.model_path.write_text(text)
+    provenance = asset.provenance
+    assert up_to_date(asset.folder, provenance.inputs, provenance.generator)
+    next(asset.folder.glob("meshes/*.png")).unlink()
+    assert not up_to_date(asset.folder, provenance.inputs, provenance.generator)
+
+
 def test_furniture_is_up_to_date_without_grasps(tmp_path):
     asset = made.cupboard(tmp_path / "cupboard")
     assert up_to_date(asset.folder, {}, asset.provenance.generator)
