@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import cast
 from xml.etree import ElementTree
 
+import mujoco
+
 from asset_pipeline.build.emit import numbers
+from asset_pipeline.checks.agreement_check import joint_failures, mass_failures
 from asset_pipeline.labelling.overrides.applying import overridden
 from asset_pipeline.labelling.overrides.reading import Override, read_overrides
 from manipose_mj.assets.asset import ASSET_FILE, MODEL_FILE, Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset, write_asset_json
+from manipose_mj.assets.rest_scene import rest_scene
 from manipose_mj.assets.visible_shapes import surface, visible_shapes
 from manipose_mj.errors import InputError, unknown_name
 from manipose_mj.storage.staging import put_in_place, staging
@@ -138,19 +141,47 @@ def _has(asset: Asset, override: Override | None) -> bool:
 
 
 def _write_model(path: Path, asset: Asset) -> None:
-    """Put mass and joints into the model, where they differ."""
+    """Put mass and joints into the model, where they differ.
+
+    Raises:
+      InputError: It states them where this cannot change them, such as in another file or in a class.
+    """
+    place = f"{asset.place}/{MODEL_FILE}"
     tree = ElementTree.parse(path)
     before = path.read_text(encoding="utf-8")
     properties, root = asset.mass_properties, tree.getroot()
     if asset.kind == "rigid":
-        inertial = cast(ElementTree.Element, root.find(".//inertial"))
+        inertial = _element(root, "inertial", place)
+        for other in ("diaginertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"):
+            inertial.attrib.pop(other, None)
         i = properties.inertia
         inertial.set("mass", numbers([properties.mass]))
         inertial.set("fullinertia", numbers([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]))
     for part in asset.parts:
-        joint = cast(ElementTree.Element, root.find(f".//joint[@name='{part.name}']"))
+        joint = _element(root, f"joint[@name='{part.name}']", place)
         joint.set("pos", numbers(part.joint.origin))
         joint.set("axis", numbers(part.joint.axis))
     after = ElementTree.tostring(root, encoding="unicode")
     if after != before:
         path.write_text(after, encoding="utf-8")
+        _check_written(path, asset, place)
+
+
+def _element(root: ElementTree.Element, kind: str, place: str) -> ElementTree.Element:
+    found = root.find(f".//worldbody//{kind}")
+    if found is None:
+        raise InputError(f"{place}: cannot be relabelled: it has no {kind}; state it in this file")
+    return found
+
+
+def _check_written(path: Path, asset: Asset, place: str) -> None:
+    """Whether MuJoCo reads what was written as it was meant, for example in no frame."""
+    try:
+        model = rest_scene(path, plane=False)
+    except (ValueError, mujoco.FatalError) as error:
+        line = " ".join(str(error).split())
+        raise InputError(f"{place}: cannot be relabelled: it does not compile: {line}") from None
+    rigid = asset.kind == "rigid"
+    wrong = mass_failures(asset, model) if rigid else joint_failures(asset, model)
+    if wrong:
+        raise InputError(f"{place}: cannot be relabelled: {wrong[0]}")

@@ -79,7 +79,7 @@ def body_failures(asset: Asset, model: mujoco.MjModel) -> list[str]:
     solid = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype > 0))
     failures = []
     if asset.kind == "rigid" and model.nbody > BASE:
-        failures += _mass_differences(asset, model, data)
+        failures += mass_failures(asset, model)
     if len(solid):
         labels = {"label": asset.label}
         labels |= {f"handle of {p.name!r}": p.handle for p in asset.parts if p.handle is not None}
@@ -111,7 +111,9 @@ def _joint_differences(
     return failures
 
 
-def _mass_differences(asset: Asset, model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
+def mass_failures(asset: Asset, model: mujoco.MjModel) -> list[str]:
+    """A line for each way in which a rigid asset's mass does not fit the model; arguments as above."""
+    data = _at_rest(model)
     stated, masses = asset.mass_properties, model.body_mass[BASE:]
     failures = []
     if abs(masses.sum() - stated.mass) > LIMITS.mass * stated.mass:

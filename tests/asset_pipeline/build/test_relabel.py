@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -92,6 +93,37 @@ def test_a_label_that_is_measured_again_counts_its_print(tmp_path):
     with pytest.raises(InputError, match=r"does not compile: .*\.png") as caught:
         relabel(asset.folder, _labels(tmp_path, "block: {object_type: mirror, up: [0, 1, 0]}\n"))
     assert "\n" not in str(caught.value)
+
+
+def test_a_mass_is_put_into_a_model_that_states_its_inertia_otherwise(tmp_path):
+    asset = made.block(tmp_path / "block")
+    text = re.sub(
+        r'fullinertia="[^"]*"', 'diaginertia="1e-4 1e-4 1e-4"', asset.model_path.read_text()
+    )
+    asset.model_path.write_text(text)
+    relabel(asset.folder, _labels(tmp_path, "block: {mass: 0.4}\n"))
+    model = mujoco.MjModel.from_xml_path(str(asset.model_path))
+    assert model.body("block").mass == 0.4
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"),
+    [
+        ('<include file="inertial.xml"/>', "it has no inertial; state it in this file"),
+        ('<frame pos="0 0 1">{}</frame>', "its centre of mass is"),
+        ("<body name='own'>{}</body>", "weighs 0.4 kg in asset.json, but 0.88 kg"),
+    ],
+)
+def test_a_model_whose_mass_is_elsewhere_is_refused_and_stays(tmp_path, moved, said):
+    asset = made.block(tmp_path / "block")
+    text = asset.model_path.read_text()
+    (inertial,) = re.findall(r"<inertial[^>]*/>", text)
+    (asset.folder / "inertial.xml").write_text(f"<mujoco>{inertial}</mujoco>")
+    asset.model_path.write_text(text.replace(inertial, moved.format(inertial)))
+    before = asset.model_path.read_text()
+    with pytest.raises(InputError, match=rf"block/model.xml: cannot be relabelled: {said}") as told:
+        relabel(asset.folder, _labels(tmp_path, "block: {mass: 0.4}\n"))
+    assert "\n" not in str(told.value) and asset.model_path.read_text() == before
 
 
 def test_a_build_that_measures_as_told_counts_the_print(tmp_path):
