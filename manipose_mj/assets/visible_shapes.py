@@ -24,12 +24,8 @@ from manipose_mj.poses import compose, invert, quaternion_to_rotation
 
 # How many of MuJoCo's three sizes each primitive has.
 _SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1, "ellipsoid": 3}
-_UNSTATED = (
-    0.5,
-    0.5,
-    0.5,
-    1.0,
-)  # MuJoCo's colour of a geom that states none: its material's counts
+# MuJoCo's colour of a geom that states none: its material's counts.
+_UNSTATED = (0.5, 0.5, 0.5, 1.0)
 _ROUNDING = 1e-9  # of the pose of a mesh that is where its body is [m]
 
 

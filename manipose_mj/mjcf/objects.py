@@ -14,13 +14,8 @@ from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
 
 # What a model may state of a compiler's settings to be attached to a scene as it is.
 _PLAIN = {"angle": "radian", "autolimits": "true"}
-_UNREADABLE = (
-    OSError,
-    ValueError,
-    LookupError,
-    SyntaxError,
-    mujoco.FatalError,
-)  # lxml's are SyntaxError
+# What reading a model raises; lxml's are SyntaxError.
+_UNREADABLE = (OSError, ValueError, LookupError, SyntaxError, mujoco.FatalError)
 
 
 def scene_model(asset: Asset) -> mjcf.RootElement:
