@@ -13,13 +13,13 @@ from PIL import Image, ImageDraw
 
 from manipose_mj.assets.asset import Asset
 from manipose_mj.assets.label_marks import Line, label_lines
+from manipose_mj.assets.physics import COLLISION_GROUP
 from manipose_mj.mjcf.cameras.pictures import Engine, painter
 from manipose_mj.mjcf.cameras.ray_camera import camera_intrinsics, camera_pose
 from manipose_mj.poses import compose, invert, rotation_to_quaternion, transform, vector_to_pose
 
 CAMERA = "thumbnail"
 FIELD_OF_VIEW = 20.0  # [deg]
-VISUAL_GROUP = 2
 BACKGROUND = (0.93, 0.94, 0.95)
 # Where the camera stands, and what is up in the picture, in the label frame. Tools lie along the
 # picture; all else stands upright, its front turned a little to the left.
@@ -89,7 +89,7 @@ def _aim(model: mujoco.MjModel, asset: Asset, points: Float[np.ndarray, "n 3"]) 
 def _corners(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "n 3"]:
     """Corners of the boxes around what is seen, in the world frame."""
     points = []
-    for geom in np.flatnonzero(model.geom_group == VISUAL_GROUP):
+    for geom in np.flatnonzero(model.geom_group < COLLISION_GROUP):
         middle, half = model.geom_aabb[geom].reshape(2, 3)
         rotation = data.geom_xmat[geom].reshape(3, 3)
         points.append(transform(compose(rotation, data.geom_xpos[geom]), middle + CORNERS * half))

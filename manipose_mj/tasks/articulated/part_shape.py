@@ -13,7 +13,6 @@ from jaxtyping import Float
 
 from manipose_mj.assets.asset import Asset, MovingPart
 from manipose_mj.assets.label import PoseLabel
-from manipose_mj.assets.physics import COLLISION_GROUP
 from manipose_mj.poses import compose, rotation_about
 
 # How far a door has to be open at most for a hand to pass with what it holds [rad]; some fold back by half a turn.
@@ -132,10 +131,10 @@ def _around(boxes: Float[np.ndarray, "n 2 3"]) -> Float[np.ndarray, "2 3"]:
 
 @lru_cache(maxsize=256)
 def _geom_boxes(model_path: Path) -> dict[str, Float[np.ndarray, "n 2 3"]]:
-    """Low and high corners of the collision geoms of every body, by its name; bodies without are left out."""
+    """Low and high corners of the geoms that touch, of every body by its name; bodies without are left out."""
     spec = mujoco.MjSpec.from_file(str(model_path))
     for geom in list(spec.geoms):
-        if geom.group != COLLISION_GROUP:
+        if not geom.contype:
             spec.delete(geom)
     for looks in (*spec.materials, *spec.textures):
         spec.delete(looks)

@@ -45,6 +45,15 @@ def test_axes_are_seen_through_the_object_from_the_labels_side(tmp_path):
     assert np.abs(one - other).mean() > 10
 
 
+def test_whatever_group_of_those_seen_an_object_is_of_it_looks_the_same(tmp_path):
+    asset = made.block(tmp_path / "block")
+    before = thumbnail(asset, SIZE, engine="ray")
+    text = asset.model_path.read_text()
+    assert 'group="2"' in text
+    asset.model_path.write_text(text.replace('group="2"', 'group="0"'))
+    np.testing.assert_array_equal(thumbnail(asset, SIZE, engine="ray"), before)
+
+
 def test_tools_lie_along_the_picture(tmp_path):
     knife = draft("knife", 0, tmp_path)
     picture = thumbnail(knife, SIZE, engine="ray")
