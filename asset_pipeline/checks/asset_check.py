@@ -19,11 +19,11 @@ from asset_pipeline.checks.handle_check import handle_remarks
 from asset_pipeline.checks.visual_check import visual_failures
 from asset_pipeline.geometry.settling import SETTLE_TIME, dropped, speeds
 from asset_pipeline.geometry.stable_poses import tilt
-from manipose_mj.assets.asset import Asset
+from manipose_mj.assets.asset import MODEL_FILE, Asset
 from manipose_mj.assets.asset_json import list_assets, read_asset
+from manipose_mj.assets.model_file import refuse_frames
 from manipose_mj.assets.rest_scene import rest_scene
 from manipose_mj.errors import InputError
-from manipose_mj.mjcf.objects import scene_model
 from manipose_mj.poses import quaternion_to_rotation
 
 
@@ -121,7 +121,7 @@ def check_asset(folder: Path) -> CheckResult:
     try:
         asset = read_asset(folder)
         model = rest_scene(asset.model_path, plane=asset.kind == "rigid")
-        scene_model(asset)  # or tasks cannot take it
+        refuse_frames(mujoco.MjSpec.from_file(str(asset.model_path)), MODEL_FILE)
         unlike = visual_failures(folder)
     except InputError as error:
         return CheckResult(folder.name, (str(error),))

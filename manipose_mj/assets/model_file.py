@@ -31,6 +31,20 @@ def check_model(asset: Asset) -> None:
                 raise InputError(f"{place}: has no {kind} {part.name!r}, a part of asset.json")
 
 
+def refuse_frames(spec: mujoco.MjSpec, place: str) -> None:
+    """Complain of what scenes cannot take from a model, as dm_control does not know it.
+
+    Args:
+      spec: The model as it is written.
+      place: Of its file, for the message.
+
+    Raises:
+      InputError: It has a `<frame>`.
+    """
+    if spec.frames:
+        raise InputError(f"{place}: scenes take no <frame>; write its pose into what it holds")
+
+
 @lru_cache(maxsize=1024)
 def compiled_names(path: Path) -> tuple[frozenset[str], frozenset[str]]:
     """Names of the bodies that have geoms, and of the joints."""

@@ -8,6 +8,7 @@ from dm_control import composer, mjcf
 from jaxtyping import Float, Int
 
 from manipose_mj.assets.asset import MODEL_FILE, Asset
+from manipose_mj.assets.model_file import refuse_frames
 from manipose_mj.assets.physics import SCENE_CONTACT_TIME
 from manipose_mj.errors import InputError
 from manipose_mj.poses import compose, pose_to_vector, vector_to_pose
@@ -31,7 +32,9 @@ def scene_model(asset: Asset) -> mjcf.RootElement:
         root = None  # dm_control knows less MJCF than MuJoCo, which has the last word
     if root is None or not _is_plain(root):
         try:
-            root = _rewritten(asset)
+            root = _rewritten(asset, place)
+        except InputError:
+            raise
         except _UNREADABLE as error:
             line = " ".join(str(error).split())
             raise InputError(f"{place}: cannot be read: {line}") from None
@@ -45,11 +48,10 @@ def _is_plain(root: mjcf.RootElement) -> bool:
     return stated.get("angle") == "radian" and stated.items() <= _PLAIN.items()
 
 
-def _rewritten(asset: Asset) -> mjcf.RootElement:
+def _rewritten(asset: Asset, place: str) -> mjcf.RootElement:
     """The model as MuJoCo writes it: in radians, inertias stated; only then scenes may forget its compiler's settings."""
     spec = mujoco.MjSpec.from_file(str(asset.model_path))
-    if spec.frames:
-        raise ValueError("scenes take no <frame>; write its pose into what it holds")
+    refuse_frames(spec, place)
     spec.compiler.saveinertial = True
     spec.compile()
     root = mjcf.from_xml_string(spec.to_xml(), model_dir=str(asset.folder))
