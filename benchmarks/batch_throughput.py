@@ -23,12 +23,12 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from batch.arm_targets import random_targets
+from batch.kept_starts import kept_starts
 from batch.solver_options import add_set, set_options
 from mujoco import rollout
 
 from manipose_mj import batch
 from manipose_mj.batch.capacity import Capacity
-from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.starts import RowModels, StartPool
 from manipose_mj.evaluation.statistics import machine
 from manipose_mj.tasks.core.config import EnvConfig
@@ -69,7 +69,8 @@ def measure(task: str, arguments: argparse.Namespace) -> None:
     device = jax.devices()[0].device_kind
     versions = f"MuJoCo {mujoco.__version__}, JAX {jax.__version__}"
     print(f"{machine()}; {device}; Python {platform.python_version()}, {versions}")
-    pool = _pool(task, arguments)
+    config = EnvConfig(task, objects=arguments.objects, reward_mode="dense")
+    pool = kept_starts(arguments.pool, config, range(arguments.starts))
     for model in pool.scenes:
         if arguments.noslip is not None:
             model.opt.noslip_iterations = arguments.noslip
@@ -86,16 +87,6 @@ def measure(task: str, arguments: argparse.Namespace) -> None:
     print("|" + " --- |" * len(COLUMNS))
     for count in arguments.worlds:
         _row(task, pool, count, arguments)
-
-
-def _pool(task: str, arguments: argparse.Namespace) -> StartPool:
-    if arguments.pool is not None and arguments.pool.exists():
-        return StartPool.load(arguments.pool)
-    config = EnvConfig(task, objects=arguments.objects, reward_mode="dense")
-    pool = draw_pool(config, range(arguments.starts))
-    if arguments.pool is not None:
-        pool.save(arguments.pool)
-    return pool
 
 
 def _row(task: str, pool: StartPool, count: int, arguments: argparse.Namespace) -> None:

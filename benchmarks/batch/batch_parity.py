@@ -13,7 +13,7 @@ States in which the robot touches nothing and the others are counted apart.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -24,10 +24,10 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from kept_starts import kept_starts
 from solver_options import add_set, set_options
 
 from manipose_mj import batch
-from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.evaluation.statistics import machine, wilson_interval
 from manipose_mj.robustness.plans import Plans, recorded_plans
@@ -68,6 +68,8 @@ def main() -> None:
     )
     add_set(parser, "of the other engine's models")
     arguments = parser.parse_args()
+    if arguments.noise is not None and arguments.against != "c":
+        parser.error("--noise is of another engine c; give --against c")
     print(f"{machine()}; {jax.devices()[0].device_kind}; MuJoCo {mujoco.__version__}")
     if arguments.plan_from is not None:
         objects = tuple(arguments.objects) if arguments.objects else None
@@ -78,11 +80,11 @@ def main() -> None:
             objects=objects,
             jobs=arguments.threads,
         )
-        pool = _pool(arguments.pool, plans.config, [plan.seed for plan in plans.plans])
+        pool = kept_starts(arguments.pool, plans.config, [plan.seed for plan in plans.plans])
         worlds, sources = len(plans.plans), {"plans": partial(planned, plans)}
     else:
         config = EnvConfig(arguments.task, objects=arguments.objects)
-        pool = _pool(arguments.pool, config, range(arguments.starts))
+        pool = kept_starts(arguments.pool, config, range(arguments.starts))
         pool = replace(pool, layout=replace(pool.layout, control_mode="pd_ee_pose"))
         worlds = arguments.worlds
         sources = {f"seed {seed}": partial(grasping, seed) for seed in arguments.seeds}
@@ -96,15 +98,6 @@ def main() -> None:
     else:
         given = partial(_of_c, pool, arguments.noise, np.random.default_rng(0))
     compare(reference, other, given, sources)
-
-
-def _pool(path: Path | None, config: EnvConfig, seeds: Sequence[int]) -> StartPool:
-    if path is not None and path.exists():
-        return StartPool.load(path)
-    pool = draw_pool(config, seeds)
-    if path is not None:
-        pool.save(path)
-    return pool
 
 
 def compare(

@@ -18,10 +18,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from kept_starts import kept_starts
 
 from manipose_mj import batch
 from manipose_mj.assets import catalogue
-from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.perception.cameras import Cameras
 from manipose_mj.batch.perception.clouds import noisy_images, object_clouds
 from manipose_mj.batch.perception.reaching import estimate_and_choose, grasp_table
@@ -52,7 +52,8 @@ def main() -> None:
     arguments = parser.parse_args()
     compile_at_once_on_gpus()
     print(f"{machine()}; {jax.devices()[0].device_kind}, JAX {jax.__version__}")
-    pool = _pool(arguments)
+    config = EnvConfig(arguments.task, objects=arguments.objects, obs_mode="state+pose")
+    pool = kept_starts(arguments.pool, config, range(arguments.starts))
     worlds = batch.from_pool(pool, arguments.worlds, arguments.engine, visual=True)
     started = time.perf_counter()
     height, width = arguments.size
@@ -85,16 +86,6 @@ def main() -> None:
             print(f"grasps in reach: {float(choice.found.mean()):.0%}")
         started = time.perf_counter()
     worlds.close()
-
-
-def _pool(arguments: argparse.Namespace) -> StartPool:
-    if arguments.pool is not None and arguments.pool.exists():
-        return StartPool.load(arguments.pool)
-    config = EnvConfig(arguments.task, objects=arguments.objects, obs_mode="state+pose")
-    pool = draw_pool(config, range(arguments.starts))
-    if arguments.pool is not None:
-        pool.save(arguments.pool)
-    return pool
 
 
 def _whole(

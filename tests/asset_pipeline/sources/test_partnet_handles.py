@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from manipose_mj.assets.asset import Asset
+from tests.asset_pipeline.sources.drawn_boards import Boards, board_visuals
 
 # z up and the front towards -x, no unit: name of the part, lowest and highest corner.
-Boards = list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]
 BASE: Boards = [
     ("wall-1", (-0.5, -0.5, 0.0), (0.5, -0.46, 1.0)),
     ("wall-2", (-0.5, 0.46, 0.0), (0.5, 0.5, 1.0)),
@@ -30,18 +29,10 @@ KINDS = {"slider": ("prismatic", "1 0 0", -0.6, 0), "hinge": ("revolute", "0 0 1
 
 def _drawn(folder: Path, links: dict[str, tuple[str, str, Boards]]) -> Path:
     """A folder with a base and links, by name: what they hang on, how they move and their boards."""
-    (folder / "textured_objs").mkdir(parents=True)
     texts = ['<link name="root"/>']
     joints = ['<joint name="j" type="fixed"><parent link="root"/><child link="base"/></joint>']
     for link, (parent, motion, boards) in {"base": ("", "", BASE), **links}.items():
-        visuals = ""
-        for count, (name, low, high) in enumerate(boards):
-            file = f"textured_objs/{link}_{count}.obj"
-            trimesh.creation.box(bounds=[low, high]).export(folder / file)
-            visuals += (
-                f'<visual name="{name}"><geometry><mesh filename="{file}"/></geometry></visual>'
-            )
-        texts.append(f'<link name="{link}">{visuals}</link>')
+        texts.append(f'<link name="{link}">{board_visuals(folder, link, boards)}</link>')
         if parent:
             kind, axis, lower, upper = KINDS[motion]
             joints.append(

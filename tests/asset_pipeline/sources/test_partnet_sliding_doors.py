@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.checks.asset_check import check_asset
 from asset_pipeline.sources.partnet_mobility import objects as partnet_mobility
 from manipose_mj.tasks.articulated.part_choice import kind_of
+from tests.asset_pipeline.sources.drawn_boards import board_visuals
 
 # z up and the front towards -x, no unit: name of the part, lowest and highest corner.
 BASE = [
@@ -32,17 +32,9 @@ DOOR = [
 
 
 def _drawn(folder: Path, limits: tuple[float, float], axis: str) -> Path:
-    (folder / "textured_objs").mkdir(parents=True)
     links = ['<link name="base"/>']
     for link, boards in (("link_0", BASE), ("link_1", DOOR)):
-        visuals = ""
-        for count, (name, low, high) in enumerate(boards):
-            file = f"textured_objs/{link}_{count}.obj"
-            trimesh.creation.box(bounds=[low, high]).export(folder / file)
-            visuals += (
-                f'<visual name="{name}"><geometry><mesh filename="{file}"/></geometry></visual>'
-            )
-        links.append(f'<link name="{link}">{visuals}</link>')
+        links.append(f'<link name="{link}">{board_visuals(folder, link, boards)}</link>')
     joints = (
         '<joint name="joint_0" type="fixed"><parent link="base"/><child link="link_0"/></joint>'
         '<joint name="joint_1" type="prismatic"><parent link="link_0"/><child link="link_1"/>'
