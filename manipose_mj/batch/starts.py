@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from manipose_mj.batch.measurement import Addresses, Measurement
 from manipose_mj.errors import InputError
 from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.tasks import pytrees
 from manipose_mj.tasks.goals import Goal, RewardMode, Tolerance
 from manipose_mj.tasks.scene.indices import SceneShapes
 
@@ -130,6 +131,8 @@ class StartPool:
             text.update(np.ascontiguousarray(start.simulation).tobytes())
             for name, values in sorted(start.model.items()):
                 text.update(name.encode() + np.ascontiguousarray(values).tobytes())
+            for goal in start.goals:
+                pytrees.register(type(goal))  # or it is one leaf, whose bytes are an address
             leaves, structure = jax.tree.flatten((start.goals, start.shapes, start.constants))
             text.update(str(structure).encode())
             for leaf in leaves:

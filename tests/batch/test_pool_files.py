@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
 from typing import Any, cast
 
 import mujoco
 import pytest
 
+from manipose_mj.batch.drawing import draw_pool
 from manipose_mj.batch.starts import StartPool
 from manipose_mj.errors import InputError
+from manipose_mj.tasks.core.config import EnvConfig
 
 DAMAGED = {
     "of a module that is not there": b"cno_such_module\nPool\n.",
@@ -52,3 +56,13 @@ def test_a_folder_is_no_place_for_a_pool(tmp_path):
         pool.save(tmp_path)
     assert str(refusal.value) == f"{tmp_path}: is a folder; expected the name of a file to write"
     assert not list(tmp_path.iterdir())
+
+
+def test_a_pool_has_the_same_digest_in_every_process(tmp_path):
+    pool = draw_pool(EnvConfig("single_object/target_pose", objects=("box_000",)), range(1))
+    pool.save(tmp_path / "pool")
+    # Nothing else of batched worlds is loaded there.
+    code = "from manipose_mj.batch.starts import StartPool; import sys; print(StartPool.load(sys.argv[1]).digest)"
+    command = [sys.executable, "-c", code, str(tmp_path / "pool")]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said.split() == [pool.digest]
