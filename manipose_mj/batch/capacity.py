@@ -6,7 +6,11 @@ costs memory. The probe plays some of a pool's starts on the CPU and counts.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import logging
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -19,8 +23,12 @@ from manipose_mj.errors import InputError
 from manipose_mj.mjcf.panda.kinematics import POSITION_LIMITS
 from manipose_mj.mjcf.panda.robot import HOME, MAX_OPENING
 from manipose_mj.mjcf.panda.servos import ServoAddresses
+from manipose_mj.storage.cache_file import new_cache_file
+from manipose_mj.storage.cache_root import cache_root
+from manipose_mj.storage.source_hash import source_hash
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
 
+_log = logging.getLogger(__name__)
 PROBED = 8  # starts
 MARGIN = 1.5  # of what the probe saw
 # On top of that: a hand that closes on what no probed hand closed on.
@@ -78,6 +86,39 @@ class Peaks:
         more = MORE_CONSTRAINTS + PART_CONSTRAINTS * self.parts
         constraints = MARGIN * int(self.constraints.max()) + more
         return Capacity(contacts, int(np.ceil(constraints)))
+
+
+def kept_probe(pool: StartPool) -> Peaks:
+    """`probe`, whose peaks are kept in the cache: nothing is played for a pool that was probed before."""
+    path = _kept_at(pool)
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        contacts, constraints = (np.array(kept[name], int) for name in ("contacts", "constraints"))
+        return Peaks(contacts, constraints, kept["parts"])
+    except (OSError, ValueError, TypeError, KeyError):
+        peaks = probe(pool)  # there are none, or they cannot be read
+    values = {
+        "contacts": peaks.contacts.tolist(),
+        "constraints": peaks.constraints.tolist(),
+        "parts": peaks.parts,
+    }
+    try:
+        with new_cache_file(path) as scratch:
+            scratch.write_text(json.dumps(values), encoding="utf-8")
+    except InputError as error:
+        _log.warning("peaks of contacts are not kept: %s", error)
+    return peaks
+
+
+def _kept_at(pool: StartPool) -> Path:
+    """Another file for everything that a probe's peaks depend on."""
+    digest = hashlib.sha256(repr((pool.layout, pool.seeds, pool.digest)).encode())
+    for scene in pool.scenes:
+        compiled = np.zeros(mujoco.mj_sizeModel(scene), np.uint8)
+        mujoco.mj_saveModel(scene, None, compiled)
+        digest.update(compiled.tobytes())
+    code = source_hash((__name__,), mujoco.__version__, np.__version__)
+    return cache_root() / "probes" / f"{code}-{digest.hexdigest()[:16]}.json"
 
 
 def probe(pool: StartPool) -> Peaks:

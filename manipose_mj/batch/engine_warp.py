@@ -13,7 +13,7 @@ import warp as wp  # pyright: ignore[reportMissingImports]
 from jaxtyping import Bool, Float, Int
 
 from manipose_mj.assets.franka_hand import MAX_OPENING
-from manipose_mj.batch.capacity import Capacity, probe
+from manipose_mj.batch.capacity import Capacity, kept_probe
 from manipose_mj.batch.kernels import warp_kernels as kernels
 from manipose_mj.batch.kernels.kernels_ahead import begin_compiling
 from manipose_mj.batch.measurement import Measurement
@@ -58,7 +58,7 @@ class WarpEngine:
         Args:
           pool: Of starts.
           worlds: How many there are.
-          capacity: Room for contacts and constraints; None: from a `probe` of the pool.
+          capacity: Room for contacts and constraints; None: from a `kept_probe` of the pool.
           visual: Whether cameras shall see the objects and furniture of several scenes.
           dry: Launch what a step launches and no more, to find out what it is.
 
@@ -75,7 +75,7 @@ class WarpEngine:
             # One kernel depends on the room: it is compiled below.
             likeness = f"{_likeness(model)} {visual}"
             compiling = begin_compiling(dry_engine, (pool, visual), self._device.arch, likeness)
-        self.capacity = capacity or probe(pool).capacity(worlds)
+        self.capacity = capacity or kept_probe(pool).capacity(worlds)
         with wp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)
             self._model.opt.warn_overflow = 0  # it is reported, not printed

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
-from manipose_mj.batch import Capacity
-from manipose_mj.batch.capacity import Peaks, near_pairs, probe, touching_pairs
+from manipose_mj.batch import Capacity, capacity
+from manipose_mj.batch.capacity import Peaks, kept_probe, near_pairs, probe, touching_pairs
 from manipose_mj.batch.drawing import draw_pool
-from manipose_mj.batch.starts import RowModels
+from manipose_mj.batch.starts import RowModels, awake
 from manipose_mj.errors import InputError
 from manipose_mj.tasks.core.config import EnvConfig
 from manipose_mj.tasks.core.simulation_state import unflatten, write_simulation
@@ -36,6 +38,35 @@ def test_the_same_pool_has_the_same_peaks(boxes, peaks):
     again = probe(boxes)
     np.testing.assert_array_equal(again.contacts, peaks.contacts)
     np.testing.assert_array_equal(again.constraints, peaks.constraints)
+
+
+def test_a_pool_is_probed_once(boxes, peaks, monkeypatch, tmp_path, caplog):
+    monkeypatch.setenv("MANIPOSE_CACHE", str(tmp_path))
+    probed = []
+
+    def counted(pool):
+        probed.append(pool)
+        return peaks
+
+    monkeypatch.setattr(capacity, "probe", counted)
+    first, again = kept_probe(boxes), kept_probe(boxes)
+    assert len(probed) == 1
+    for found in (first, again):
+        assert found.capacity(100) == peaks.capacity(100)
+    harder = replace(boxes, scenes=tuple(awake(scene) for scene in boxes.scenes))
+    harder.scenes[0].opt.impratio *= 2
+    kept_probe(harder)
+    assert len(probed) == 2
+    files = sorted((tmp_path / "probes").iterdir())
+    assert len(files) == 2
+    for file in files:
+        file.write_text('{"contacts": [1')  # as a full disk leaves it
+    assert kept_probe(boxes).capacity(100) == peaks.capacity(100)
+    assert len(probed) == 3
+    (tmp_path / "a_file").touch()
+    monkeypatch.setenv("MANIPOSE_CACHE", str(tmp_path / "a_file"))
+    assert kept_probe(boxes).capacity(100) == peaks.capacity(100)
+    assert "peaks of contacts are not kept" in caplog.text
 
 
 def test_hands_touch_what_they_do_not_at_the_start(boxes, peaks):
