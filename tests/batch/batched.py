@@ -28,7 +28,7 @@ def wandering(steps: int, worlds: int, seed: int = 0) -> np.ndarray:
 
 def on_the_cpu(task: str, seed: int, **options: Any) -> composer.Environment:
     """The environment at the start of the episode of a seed."""
-    environment = load(*task.split("/"), seed=0, **options)
+    environment = load(*task.split("/"), seed=seed, **options)
     environment.reset(EpisodeSpec(seed=seed))
     return environment
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import jax
 import numpy as np
 import pytest
 
-from manipose_mj import suite
+from manipose_mj import batch, suite
 from manipose_mj.actions import CONTROL_MODES
+from manipose_mj.batch.drawing import draw_pool
 from tests.batch.batched import make, on_the_cpu, simulation_of, wandering
+from tests.few_objects import config
 
 TASKS = ["/".join(task) for task in suite.ALL_TASKS]
+MODES_OF = "single_object/target_pose"
 SEED = 5
 
 
@@ -31,6 +37,7 @@ def test_a_world_is_the_episode_of_its_seed_bit_for_bit(task):
     states = [worlds.at(seeds)]
     for action in actions:
         states.append(worlds.step(states[-1], action))
+    states = jax.device_get(states)  # one by one their numbers would each be a program
     for world, seed in enumerate(seeds):
         environment = on_the_cpu(task, seed, reward_mode="dense")
         for state, action in zip(states[1:], actions, strict=True):
@@ -43,11 +50,23 @@ def test_a_world_is_the_episode_of_its_seed_bit_for_bit(task):
             assert bool(state.success[world]) is environment.task.success_now
 
 
+@pytest.fixture(scope="module")
+def drawn():
+    """Two starts for every control mode, which changes nothing about them."""
+    return draw_pool(config(MODES_OF, obs_mode="state"), [SEED, SEED + 1])
+
+
+def test_starts_are_the_same_in_every_control_mode(drawn):
+    other = draw_pool(config(MODES_OF, obs_mode="state", control_mode="pd_ee_pose"), drawn.seeds)
+    assert other.digest == drawn.digest
+    assert other.layout == replace(drawn.layout, control_mode="pd_ee_pose")
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("mode", CONTROL_MODES)
-def test_control_modes_are_those_of_the_task(mode):
-    task = "single_object/target_pose"
-    worlds = make(task, seed=SEED, control_mode=mode, obs_mode="state")
+def test_control_modes_are_those_of_the_task(mode, drawn):
+    pool = replace(drawn, layout=replace(drawn.layout, control_mode=mode))
+    worlds = batch.from_pool(pool, 2, "c")
     rng = np.random.default_rng(0)
     if mode in ("pd_joint_pos", "pd_joint_pos_vel"):
         actions = np.zeros((6, 2, len(worlds.lower)), np.float32)
@@ -59,7 +78,7 @@ def test_control_modes_are_those_of_the_task(mode):
         if mode == "pd_ee_pose":
             actions[..., :6] = np.array([0.5, 0.1, 0.3, np.pi, 0.0, 0.4], np.float32)
     state = worlds.at([SEED, SEED + 1])
-    environment = on_the_cpu(task, SEED, control_mode=mode, obs_mode="state")
+    environment = on_the_cpu(MODES_OF, SEED, control_mode=mode, obs_mode="state")
     for action in actions:
         state = worlds.step(state, action)
         step = environment.step(action[0])
