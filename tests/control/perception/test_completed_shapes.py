@@ -15,6 +15,7 @@ from manipose_mj.control.perception.objects.completed_shape import (
     completed_shape,
     convex_parts,
     looked_through,
+    stable_rests,
 )
 from manipose_mj.control.perception.objects.estimated_symmetry import estimated_symmetry
 from manipose_mj.control.perception.objects.object_kinds import object_kind
@@ -43,6 +44,18 @@ def environment_with(name: str):
     environment = suite.make(config, 1)
     environment.reset()
     return environment
+
+
+@pytest.mark.parametrize(
+    ("shift", "size", "center"),
+    [(0.0, 0.1, 1.0), (1e9, 0.1, 1e9), (1e9, 1e9, 0.0), (0.0, 1e-6, 0.1), (0.0, 1e6, 5e5)],
+    ids=["center outside", "far", "huge", "tiny", "center on a face"],
+)
+def test_rests_are_found_wherever_the_centre_of_mass_is(shift, size, center):
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2
+    rests = stable_rests(corners + [shift, 0.0, 0.0], np.array([center, 0.0, 0.0]))
+    assert rests
+    assert all(np.isfinite(rest.rotation).all() for rest in rests)
 
 
 def test_what_is_not_convex_is_cut_where_it_saves_volume():

@@ -111,6 +111,38 @@ def test_an_estimator_that_fails_is_a_failure_of_perception(cup, truth, answer, 
     assert raised.value.stage == "perception"
 
 
+def _beyond(away: float, extents: float | None = None, among: bool = False):
+    """An answer that far from the cameras, or of an object that large; as the first, or as another hypothesis."""
+    wrong = {"pose": np.eye(4), "score": 0.9}
+    wrong["pose"][0, 3] = away
+    if extents is not None:
+        wrong["extents"] = np.full(3, extents)
+    return {"pose": np.eye(4), "score": 0.9, "hypotheses": [wrong]} if among else wrong
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (_beyond(1e9), "estimator mine: the pose is 1e.09 m from the object's points; expected"),
+        (_beyond(0.0, 1e6), "estimator mine: extents are up to 1e.06 m; expected metres"),
+        (_beyond(1e9, among=True), "estimator mine: hypothesis 0: the pose is 1e.09 m"),
+    ],
+    ids=["far", "huge", "hypothesis"],
+)
+def test_an_answer_that_cannot_be_about_what_is_seen_is_a_failure_of_perception(
+    cup, truth, answer, reason
+):
+    with pytest.raises(StageFailure, match=reason) as raised:
+        perceived(cup, Recalled(truth, lambda: answer)).reset(0)
+    assert raised.value.stage == "perception"
+    assert "\n" not in raised.value.reason
+
+
+def test_a_wrong_answer_on_the_table_or_of_a_large_object_is_taken(cup, truth):
+    answer = _beyond(3.0, 4.0)
+    perceived(cup, Recalled(truth, lambda: answer)).reset(0)
+
+
 def test_a_server_that_is_gone_is_no_failure_of_an_episode(cup, truth):
     def lost():
         raise ServerLostError("gone")

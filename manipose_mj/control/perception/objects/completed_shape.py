@@ -221,11 +221,25 @@ def _mass(meshes: Sequence[trimesh.Trimesh]) -> MassProperties:
 def stable_rests(
     corners: Float[np.ndarray, "c 3"], center: Float[np.ndarray, "3"]
 ) -> tuple[StablePose, ...]:
-    """The likeliest poses in which the hull lies still."""
+    """The likeliest poses in which the hull lies still.
+
+    A centre of mass that is not inside the hull, as rounding puts it in thin or far bodies, counts as the mean corner.
+    A hull without an inside rests as it is.
+    """
     hull = trimesh.convex.convex_hull(corners)
-    poses, shares = trimesh.poses.compute_stable_poses(hull, center_mass=center)
+    centers = [each for each in (center, hull.vertices.mean(axis=0)) if _inside(hull, each)]
+    if not centers:  # trimesh would draw centres until one is inside, for ever
+        return (StablePose(np.eye(3), -float(corners[:, 2].min()), 1.0),)
+    poses, shares = trimesh.poses.compute_stable_poses(hull, center_mass=centers[0])
     rests = [
         StablePose(pose[:3, :3], -float((corners @ pose[2, :3]).min()), float(share))
         for pose, share in zip(poses, shares, strict=True)
     ]
     return tuple(sorted(rests, key=lambda rest: -rest.probability)[:_RESTS])
+
+
+def _inside(hull: trimesh.Trimesh, point: Float[np.ndarray, "3"]) -> bool:
+    """Whether a point is inside all faces, as `compute_stable_poses` looks for it."""
+    hull = hull.convex_hull  # kept by the mesh
+    heights = ((point - hull.triangles_center) * hull.face_normals).sum(axis=1)
+    return bool((heights < 0).all())
