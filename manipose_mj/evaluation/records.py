@@ -31,22 +31,22 @@ class EpisodeResult:
       task: `"domain/task"`.
       episode: Index within the evaluation, from 0.
       seed: The episode's own seed.
-      object: Name of the manipulated asset.
+      object: Name of the manipulated asset; where there are several objects, the first one's.
       pose_source: Where the policy took object poses from: `"oracle"` from the simulator, `"estimated"`,
         `"estimated_objects"`, or `"none"` where it got none.
       success_once: The goal was met at some control step.
       success_at_end: The goal was met when the episode ended.
       failure: A member of `STAGES`, or None on success at the end.
       reason: One line that says what failed; empty on success.
-      translation_error: Symmetric pose error to the goal at the end [m], None where it has no meaning or, in batched
-        worlds, was not measured.
+      translation_error: Symmetric pose error to the goal at the end [m], the largest of all goals' objects; None where it
+        has no meaning or, in batched worlds, was not measured.
       rotation_error: The same for the rotation [rad].
       steps: Control steps taken.
       sim_time: Simulated time [s].
       max_penetration: Deepest contact over the episode [m]; None in batched worlds, which do not measure it.
       wall_s: Wall-clock time [s].
-      estimate_translation_error: Largest error of an estimate that an object was grasped with [m];
-        None for true poses, and where nothing was grasped.
+      estimate_translation_error: Largest error of an estimate that a grasp was planned with, whatever came of it [m];
+        None for true poses, and where no grasp was planned.
       estimate_rotation_error: The same for the rotation, the least over the symmetry [rad].
       decisions: Times the policy was asked.
       clipped_actions: Actions with a number beyond its limit.

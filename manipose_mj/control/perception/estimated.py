@@ -167,12 +167,12 @@ class EstimatedPerception:
     def _uncertain(self) -> tuple[str, ...]:
         """What is estimated with a confidence that does not last, and not in the hand."""
         known = self._known.items()
-        return tuple(n for n, s in known if s.confidence < _SURE and n != self._held_name)
+        return tuple(n for n, s in known if s.confidence < _SURE and n != self.held_name)
 
     @property
     def _outgrown(self) -> tuple[str, ...]:
         """What goals are about, sure, not in the hand, and seen by many more points than its shape was found by."""
-        asked = (self._needed & self._known.keys()) - {self._held_name, *self._uncertain}
+        asked = (self._needed & self._known.keys()) - {self.held_name, *self._uncertain}
         counts = {n: sum(map(len, self._views.of(self._physics, n))) for n in sorted(asked)}
         return tuple(n for n, count in counts.items() if count > _MORE * self._known[n].points)
 
@@ -181,7 +181,7 @@ class EstimatedPerception:
         at what goals are about and shows more of itself than when its shape was found."""
         now = float(self._physics.data.time)
         # What furniture hides and the hand has lost may lie otherwise now: furniture is looked into again.
-        forgotten = (self._lost & self._enclosed & self._known.keys()) - {self._held_name}
+        forgotten = (self._lost & self._enclosed & self._known.keys()) - {self.held_name}
         for name in forgotten:
             del self._known[name]
         self._dropped, self._lost = self._dropped - forgotten, set()
@@ -259,11 +259,11 @@ class EstimatedPerception:
         if time != self._time:
             tcp = self._planning_scene().tcp_pose(joints)
             moved = self._world.follow(tcp, {n: s.pose for n, s in self._known.items()})
-            for name in moved.keys() - {self._held_name}:  # what lies in drawers, seen or not
+            for name in moved.keys() - {self.held_name}:  # what lies in drawers, seen or not
                 self._known[name] = self._seen[name] = replace(self._known[name], pose=moved[name])
             for name in self._known:
                 self._known[name] = self._updated(name, tcp)
-            for name in self._dropped - {self._held_name}:
+            for name in self._dropped - {self.held_name}:
                 self._grasps[name] = self._grasps_of(name)
                 self._dropped.remove(name)
             self._time = time
@@ -283,7 +283,8 @@ class EstimatedPerception:
             self._held = InHand(name, invert(tcp) @ self._known[name].pose, self.robot()[1])
 
     @property
-    def _held_name(self) -> str:
+    def held_name(self) -> str:
+        """The object in the hand; empty: none that was seen."""
         return "" if self._held is None else self._held.name
 
     def feel(self, name: str, path: Float[np.ndarray, "n 4 4"], stopped: bool) -> None:
@@ -302,7 +303,7 @@ class EstimatedPerception:
     def _updated(self, name: str, tcp: Float[np.ndarray, "4 4"]) -> SensedPose:
         """The pose of an object now: where it was, or the hand has brought it, if new views fit that; else as they show."""
         before = self._known[name]
-        held = self._held if self._held_name == name else None
+        held = self._held if self.held_name == name else None
         if held is not None:
             before = replace(before, pose=tcp @ held.pose_tcp)
         views = self._views.of(self._physics, name)

@@ -69,6 +69,11 @@ class PerturbedPerception:
         return self._perception.unseen
 
     @property
+    def held_name(self) -> str:
+        """What is in the hand; empty: nothing."""
+        return self._held or ""
+
+    @property
     def arm(self) -> ArmModel:
         """The arm in the scene of the last observation."""
         return self._perception.arm

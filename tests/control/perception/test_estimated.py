@@ -254,7 +254,9 @@ def test_a_category_without_weights_is_told_in_one_line(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("shift", "turn", "stage"), [(0.03, 0.0, "perception"), (0.0, 0.5, "perception"), (0.01, 0.1, "grasp")]
 )  # fmt: skip
-def test_a_failure_with_a_wrong_estimate_is_one_of_perception(cup, truth, shift, turn, stage):
+def test_a_failure_with_a_wrong_estimate_is_one_of_perception(
+    cup, truth, shift, turn, stage, monkeypatch
+):
     baseline = Baseline(cup, "estimated")
     perception = baseline.perception
     assert isinstance(perception, EstimatedPerception)
@@ -272,6 +274,11 @@ def test_a_failure_with_a_wrong_estimate_is_one_of_perception(cup, truth, shift,
     cause = errors.cause(StageFailure("grasp", "the gripper closed past object"))
     assert cause.stage == stage
     assert "the gripper closed past object" in cause.reason
+    assert ("object was estimated" in cause.reason) == (stage == "perception")
+    monkeypatch.setattr(type(perception), "held_name", "object")
+    errors.after_planning()
+    cause = errors.cause(StageFailure("release", "it fell"))
+    assert ("object was grasped with an estimate" in cause.reason) == (stage == "perception")
 
 
 def test_the_estimate_that_is_named_is_the_one_beyond_the_tolerance(cup, truth):
