@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -211,9 +212,10 @@ def _record(config: RecordConfig, resume: bool, on_progress: Callable[[int, int]
         if wins >= config.episodes:
             break
         if len(ended) > _PATIENCE * (wins + 2):
+            stage, count = Counter(each.failure for each in ended if each.failure).most_common(1)[0]
             raise InputError(
-                f"{config.task}: the baseline succeeded in {wins} of {len(ended)} attempts; "
-                "too few to record demonstrations"
+                f"{config.task}: the baseline succeeded in {wins} of {len(ended)} attempts, too few to record "
+                f"demonstrations; {count} failed in {stage}: `manipose evaluate {config.task}` says why"
             )
         more = [next(seeds) for _ in range(config.episodes - wins)]
         planned += more
