@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from manipose_mj.errors import InputError
 from manipose_mj.poses import Array
 from manipose_mj.tasks import pytrees
 from manipose_mj.tasks.goals import Goal, RewardMode, Tolerance, reward, success
@@ -58,7 +59,15 @@ class EpisodeGoals:
         """What `answer` says of each world's goals and state."""
         kinds, found = jnp.asarray(self._kind)[rows], None
         for kind, stacked in enumerate(self._stacked):
-            own = jax.vmap(answer)(take(stacked, rows), state)
+            try:
+                own = jax.vmap(answer)(take(stacked, rows), state)
+            except jax.errors.JAXTypeError as error:
+                kinds_of = sorted({type(goal).__name__ for goal in stacked})
+                raise InputError(
+                    f"goals {', '.join(kinds_of)}: cannot be traced by JAX, as batched worlds do "
+                    f"({type(error).__name__}); compute with `manipose_mj.poses.namespace(array)` in place of "
+                    "numpy, and decide with `where` in place of `if`"
+                ) from error
             found = own if found is None else jnp.where(kinds == kind, own, found)
         return found
 

@@ -59,9 +59,18 @@ class _Ends:
 
 
 def batched_results(
-    config: EvaluationConfig, batch: BatchSettings, episodes: Sequence[tuple[str, int]]
+    config: EvaluationConfig,
+    batch: BatchSettings,
+    episodes: Sequence[tuple[str, int]],
+    crashed: Callable[[str, int, Exception], EpisodeResult],
 ) -> Iterator[EpisodeResult]:
     """The results of episodes, by task and index, a batch of worlds after the other.
+
+    Args:
+      config: Of the evaluation.
+      batch: How many worlds, and on which engine.
+      episodes: Their tasks and numbers.
+      crashed: The result of an episode of a task that raised when its starts were drawn.
 
     Raises:
       InputError: The policy cannot act in many worlds, or fails at it, its rate does not divide the control steps', or
@@ -74,7 +83,14 @@ def batched_results(
     for task in sorted({task for task, _ in episodes}):
         numbers = [number for name, number in episodes if name == task]
         specs = [config.episode_spec(task, number) for number in numbers]
-        pool = draw_pool(config.env_config(task), specs)
+        try:
+            pool = draw_pool(config.env_config(task), specs)
+        except (InputError, OSError, MemoryError):
+            raise
+        except Exception as error:  # one broken task must not end the others
+            for number in numbers:
+                yield crashed(task, number, error)
+            continue
         count = min(batch.worlds, len(numbers))
         worlds = from_pool(pool, count, engine, threads=config.jobs)
         _tell(policy, worlds, settings, task)

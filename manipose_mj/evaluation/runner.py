@@ -261,7 +261,15 @@ def _outcomes(
     if config.batch is not None:
         from manipose_mj.evaluation.batched import batched_results  # loads the simulator
 
-        yield from batched_results(config, config.batch, episodes)
+        started = time.perf_counter()
+        yield from batched_results(
+            config,
+            config.batch,
+            episodes,
+            lambda task, number, error: _raised(
+                config, task, number, error, time.perf_counter() - started
+            ),
+        )
         return
     if config.dask is None and (config.jobs == 1 or len(episodes) <= 1):
         for task, episode in episodes:
@@ -318,9 +326,7 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
     except (InputError, OSError, MemoryError):
         raise
     except Exception as error:  # one broken episode must not end the other hundred
-        logger.debug("episode %d of %s raised", episode, task, exc_info=True)
-        _write_traceback(path, traceback.format_exc())
-        return _crashed(config, task, episode, error, time.perf_counter() - start)
+        return _raised(config, task, episode, error, time.perf_counter() - start)
     write_trajectory(path, trajectory)
     if trajectory.raised:
         _write_traceback(path, trajectory.raised)
@@ -330,6 +336,16 @@ def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -
 def _write_traceback(trajectory: Path, text: str) -> None:
     """Leave a traceback beside an episode's trajectory."""
     write_atomically(trajectory.with_suffix(".error.txt"), storable(text).encode("utf-8"))
+
+
+def _raised(
+    config: EvaluationConfig, task: str, episode: int, error: Exception, wall_s: float
+) -> EpisodeResult:
+    """The result of an episode that raised, whose traceback is kept."""
+    logger.debug("episode %d of %s raised", episode, task, exc_info=error)
+    text = "".join(traceback.format_exception(error))
+    _write_traceback(trajectory_path(config.out, task, episode), text)
+    return _crashed(config, task, episode, error, wall_s)
 
 
 def _crashed(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
+from manipose_mj.batch import make
 from manipose_mj.cli.main import EXIT_INPUT, main
 from manipose_mj.errors import InputError
 from manipose_mj.evaluation.batched import batched_results
@@ -204,6 +205,54 @@ def test_what_holds_while_an_action_is_held_counts(policy, hz, stop, latency, tm
 
 
 @pytest.mark.full
+def test_a_task_that_raises_costs_its_own_episodes_only(tmp_path):
+    def broken(env_config):
+        """Find no drawer."""
+        return next(iter(()))
+
+    with registered("high", HighTask) as sound, registered("broken", broken) as other:
+        results = evaluate(
+            EvaluationConfig(
+                ("/".join(other), "/".join(sound)),
+                tmp_path,
+                episodes=2,
+                objects=("box_000",),
+                policy=PolicySettings("tests.evaluation.test_batched:Lowering", obs_mode="state"),
+                batch=BatchSettings("c", 2),
+            )
+        )
+    of_task = {name: [r for r in results if r.task == "/".join(name)] for name in (sound, other)}
+    assert all(r.success_once for r in of_task[sound])
+    assert [(r.failure, r.steps) for r in of_task[other]] == [("error", 0)] * 2
+    assert of_task[other][0].reason.startswith("StopIteration")
+    notes = sorted(tmp_path.rglob("*.error.txt"))
+    assert len(notes) == 2
+    assert "next(iter(()))" in notes[0].read_text()
+
+
+class NumpyGoal(HighGoal):
+    """Computes with NumPy what JAX would have to see."""
+
+    def met(self, state, tolerance):
+        return np.linalg.norm(np.asarray(state.tcp_pose[..., :3, 3]), axis=-1) > self.height
+
+
+class NumpyTask(HighTask):
+    """Its goal cannot be traced."""
+
+    def sample(self, rng, spec: EpisodeSpec, preview: Preview) -> EpisodeStart:
+        return replace(super().sample(rng, spec, preview), goals=(NumpyGoal("object"),))
+
+
+def test_a_goal_that_cannot_be_traced_is_named():
+    with registered("numpy", NumpyTask) as name:
+        worlds = make("/".join(name), worlds=1, engine="c", objects=("box_000",))
+        state = worlds.reset(jax.random.key(0))
+        with pytest.raises(InputError, match=r"goals NumpyGoal: cannot be traced .*namespace"):
+            worlds.step(state, jnp.zeros((1, 8)))
+
+
+@pytest.mark.full
 def test_what_is_no_number_is_the_policys_failure_in_one_world_and_in_many(tmp_path):
     alone = evaluate(config(tmp_path / "alone", "Nothing", None))
     together = evaluate(config(tmp_path / "together", "Nothing", BatchSettings("c", 2)))
@@ -221,7 +270,9 @@ def test_policies_that_act_in_one_world_and_odd_rates_are_refused(tmp_path):
     ):
         asked = config(tmp_path, policy, batch, **changes)
         with pytest.raises(InputError, match=said):
-            list(batched_results(asked, batch, [(TASK, 0)]))
+            list(
+                batched_results(asked, batch, [(TASK, 0)], lambda *raised: pytest.fail(str(raised)))
+            )
 
 
 @pytest.mark.parametrize(
