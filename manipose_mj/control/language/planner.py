@@ -42,6 +42,7 @@ _NO_TEXT = "(no text)"  # endpoints refuse empty messages
 MAX_REPAIRS = 2
 _MOST_TOLD = 60  # steps that were carried out, the latest
 _MOST_SENT_BACK = 20_000  # characters of a plan that is to be mended
+_MOST_QUOTED = 100  # characters of its last answer, in the reason of a failure
 _TOO_LONG = "reply: it was cut off, for it is longer than an answer may be; give a shorter one"
 
 
@@ -168,7 +169,7 @@ class LanguagePlanner:
           InputError: The model does not answer, declines, or its last repair is still wrong.
           RecordError: The exchange cannot be written.
         """
-        mistake = ""
+        mistake = said = ""
         for _ in range(1 + MAX_REPAIRS):
             answer = self._ask(messages, schema)
             try:
@@ -177,13 +178,15 @@ class LanguagePlanner:
                 raise InputError(f"the language model declines: {refusal}") from None
             except InputError as error:
                 mistake = _TOO_LONG if answer.cut else str(error)
+                said = " ".join(answer.text.split())[:_MOST_QUOTED]
             messages = [
                 *messages,
                 {"role": "assistant", "content": answer.text[:_MOST_SENT_BACK] or _NO_TEXT},
                 {"role": "user", "content": f"That plan is refused: {mistake}. Mend it."},
             ]
         raise InputError(
-            f"the language model's plan is still wrong after {MAX_REPAIRS} repairs: {mistake}"
+            f"the language model's plan is still wrong after {MAX_REPAIRS} repairs: {mistake}; "
+            f"its last answer begins with {said!r}"
         )
 
     def question(self, scene: str) -> list[Message]:

@@ -76,6 +76,8 @@ def test_repairs_are_bounded(serve, tmp_path):
     ) as caught:
         ask()
     assert "\n" not in str(caught.value)
+    begin = " ".join(UNORDERED.split())[:40]
+    assert f"its last answer begins with '{begin}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
