@@ -26,7 +26,7 @@ os.environ.setdefault("MANIPOSE_CACHE", str(_KEPT / "manipose-mj"))
 os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))
 # Both workers compile much the same, and so does the next run. Read when JAX is imported.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
-os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.05")
 
 install_array_checks()
 
