@@ -13,6 +13,7 @@ from types import ModuleType
 
 import mujoco
 import numpy as np
+import trimesh
 
 from asset_pipeline.build.articulated import build_articulated
 from asset_pipeline.build.pool import BuildJob, BuildResult, run_jobs
@@ -55,6 +56,7 @@ SOURCES: dict[str, ModuleType] = {
 GENERATOR_VERSION = 6
 # Of household objects whose mass nobody published: between foam (150) and filled bottles (1000).
 DENSITY = 400.0  # [kg/m^3]
+_BALL = 0.95  # of the largest distance from the middle is the least one of a ball
 DEFAULT_LIMITS = Limits()
 
 
@@ -264,10 +266,23 @@ def build_scan(
         log.warning(
             "%s: the gripper can hold it nowhere; tasks that have it moved refuse it", scan.name
         )
+    if _is_a_ball(scan.mesh):
+        log.warning(
+            "%s: round on all sides: nothing seen tells its axis, so that goals of orientation are met by "
+            "chance with estimated poses",
+            scan.name,
+        )
     if override is not None:
         centred = replace(measured.label, center=box_center(body, measured.label))
         write_measured(folder, replace(measured, label=centred, stable_poses=asset.stable_poses))
     return asset
+
+
+def _is_a_ball(mesh: trimesh.Trimesh) -> bool:
+    """Whether the whole surface is about as far from the middle."""
+    surface = np.concatenate([mesh.vertices, mesh.triangles_center])
+    far = np.linalg.norm(surface - mesh.bounds.mean(axis=0), axis=1)
+    return bool(far.min() > _BALL * far.max())
 
 
 def scan_mass_properties(scan: Scan) -> MassProperties:

@@ -259,6 +259,17 @@ def test_folder_of_many_builds_but_for_the_bad_ones(tmp_path, capsys):
     assert result.status == "built"
 
 
+@pytest.mark.full
+def test_a_ball_is_told_to_have_an_axis_that_nobody_sees(tmp_path, caplog):
+    trimesh.creation.icosphere(subdivisions=3, radius=25).export(tmp_path / "marble.stl")
+    _box().export(tmp_path / "tea.stl")
+    command = ["assets", "build", "meshes", str(tmp_path), "--out", str(tmp_path / "out")]
+    assert main([*command, "--unit", "mm", "--up", "z", "--jobs", "1"]) == 0
+    told = [text for text in caplog.messages if "round on all sides" in text]
+    assert len(told) == 1
+    assert told[0].startswith("marble: ")
+
+
 def test_names_that_recur_keep_their_endings(tmp_path):
     for name in ("tea.stl", "tea.ply", "crackers/model.obj"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
