@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 
 from manipose_mj.console.process import keep_to_avx2
 from tests import tiers
@@ -27,6 +29,12 @@ os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))
 # Both workers compile much the same, and so does the next run. Read when JAX is imported.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.05")
+# Read when JAX first computes.
+_FLAGS = "--xla_cpu_multi_thread_eigen=false"
+if Version(version("jaxlib")) < Version("0.11"):
+    # Half the time to compile. Later ones end a process that sets it.
+    _FLAGS += " --xla_cpu_use_fusion_emitters=false"
+os.environ.setdefault("XLA_FLAGS", _FLAGS)
 
 install_array_checks()
 

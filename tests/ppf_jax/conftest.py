@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import os
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from packaging.version import Version
 
 if TYPE_CHECKING:
     from manipose_mj.ppf_jax.data.articulated.clouds import FurnitureBatch, FurnitureScene
     from manipose_mj.ppf_jax.data.articulated.subject import ArticulatedSubject
 
-# Read when JAX is imported, and when it first computes. Most tests compile longer than they run.
+# Read when JAX is imported. Most tests compile longer than they run.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
-_FLAGS = "--xla_cpu_multi_thread_eigen=false"
-if Version(version("jaxlib")) < Version("0.11"):
-    # A third of the time to compile. Later ones end a process that sets it.
-    _FLAGS += " --xla_cpu_use_fusion_emitters=false"
-os.environ.setdefault("XLA_FLAGS", _FLAGS)
 
 
 @pytest.fixture(scope="module")
