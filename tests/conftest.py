@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 from collections.abc import Iterator
@@ -50,6 +51,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what samples leave out, and put long files first."""
     tiers.mark_left_out(items)
     tiers.order(items)
+
+
+def pytest_collection_finish() -> None:
+    """Search for garbage seldom, and not among what was imported: JAX makes much of it when it compiles."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 @pytest.fixture(autouse=True)

@@ -76,7 +76,7 @@ class CEngine:
         size = state_size(self._pool)
         states = np.stack([packed(start.simulation, size) for start in self._pool.starts])
         # Double precision as words, which JAX leaves as they are.
-        return jnp.asarray(states.view(np.uint32))
+        return jax.device_put(states.view(np.uint32))
 
     def advance(
         self,

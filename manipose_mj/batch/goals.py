@@ -80,8 +80,9 @@ def take(tree: Any, rows: Int[Array, " worlds"]) -> Any:
 def stack_trees(trees: Sequence[Any]) -> Any:
     """Trees of one structure as one whose leaves have a leading axis; real numbers in single precision."""
 
-    def stacked(*leaves: Any) -> Array:
+    def stacked(*leaves: Any) -> np.ndarray:
         array = np.stack([np.asarray(leaf) for leaf in leaves])
-        return jnp.asarray(array.astype(np.float32) if array.dtype == float else array)
+        return array.astype(np.float32) if array.dtype == float else array
 
-    return jax.tree.map(stacked, *trees)
+    # All at once; `jnp.asarray` would compile a program for each.
+    return jax.device_put(jax.tree.map(stacked, *trees))

@@ -177,4 +177,4 @@ def read_state(path: Path | str, identity: dict[str, np.ndarray], shapes: State)
             raise InputError(
                 f"{path}: no state of such worlds can be read from it (arrays are missing or have other shapes)"
             )
-    return jax.tree.unflatten(structure, [jnp.asarray(leaf) for leaf in leaves])
+    return jax.device_put(jax.tree.unflatten(structure, leaves))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
@@ -21,7 +22,7 @@ def test_depth_and_segmentation_are_the_cpu_cameras():
     worlds = make(TASK, 2, seeds=(0, 1), objects=OBJECTS, obs_mode="state")
     cameras = Cameras(worlds, ("left", "front"), height=HEIGHT, width=WIDTH)
     state = worlds.at([0, 1])
-    images = cameras.look(state)
+    images = jax.jit(cameras.look)(state)
     assert images.depth.shape == (2, 2, HEIGHT, WIDTH) and images.rgb is None
     sensors = SensorConfig(height=HEIGHT, width=WIDTH)
     for world, seed in enumerate((0, 1)):

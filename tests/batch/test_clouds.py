@@ -55,7 +55,7 @@ def images(worlds: int) -> Images:
 
 def test_incidence_is_that_of_the_surfaces():
     depth, _, cosine = scene()
-    found = incidence(jnp.asarray(depth, jnp.float32), jnp.asarray(NUMBERS))
+    found = jax.jit(incidence)(jnp.asarray(depth, jnp.float32), jnp.asarray(NUMBERS))
     np.testing.assert_allclose(np.asarray(found)[depth > 0], cosine[depth > 0], atol=2e-3)
 
 
@@ -76,7 +76,7 @@ def test_the_same_draws_give_the_same_noise_in_jax(sensor):
 
 @pytest.mark.full
 def test_noise_has_the_spread_of_the_sensor():
-    noisy = noisy_images(images(40), jax.random.key(0))
+    noisy = jax.jit(noisy_images)(images(40), jax.random.key(0))
     depth, instance, _ = scene()
     middle = (np.s_[HEIGHT // 2 - 4 : HEIGHT // 2 + 4], np.s_[WIDTH // 2 - 4 : WIDTH // 2 + 4])
     measured = np.asarray(noisy.depth)[:, 0][:, *middle]
@@ -95,7 +95,7 @@ def test_normals_are_those_of_the_cpu(noise):
     pixels = np.argwhere(mask)[::5]
     expected = depth_normals(depth, mask, pixels, PINHOLE)
     row, column = (jnp.asarray(p, jnp.int32) for p in pixels.T)
-    found = fitted_normals(
+    found = jax.jit(fitted_normals)(
         jnp.asarray(depth, jnp.float32), jnp.asarray(mask), row, column,
         jnp.ones(len(pixels), bool), jnp.asarray(NUMBERS),
     )  # fmt: skip
@@ -106,7 +106,9 @@ def test_normals_are_those_of_the_cpu(noise):
 def test_clouds_hold_points_of_the_instance_alone():
     # The last world has no such object, whose instance is that of the surroundings.
     wanted = jnp.asarray([2, 2, 7, 0], jnp.int32)
-    clouds = object_clouds(images(4), 0, wanted, 128, jax.random.key(0))
+    clouds = jax.jit(object_clouds, static_argnums=(1, 3))(
+        images(4), 0, wanted, 128, jax.random.key(0)
+    )
     assert clouds.points.shape == (4, 128, 3)
     mask = np.asarray(clouds.mask)
     assert mask[:2].all() and not mask[2:].any()

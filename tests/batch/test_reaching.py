@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import mink
@@ -44,7 +47,9 @@ def test_it_agrees_with_mink():
     starts = np.stack([HOME + rng.uniform(-0.3, 0.3, 7) for _ in range(30)])
     moved = np.clip(starts + rng.uniform(-0.25, 0.25, starts.shape), LOW + 0.05, HIGH - 0.05)
     poses = np.stack([tcp_pose(q) for q in moved])
-    found, error = reach_poses(jnp.asarray(poses, jnp.float32), jnp.asarray(starts, jnp.float32))
+    found, error = jax.jit(reach_poses)(
+        jnp.asarray(poses, jnp.float32), jnp.asarray(starts, jnp.float32)
+    )
     assert float(error.max()) < 1e-4
     theirs = np.stack([by_mink(p, q) for p, q in zip(poses, starts, strict=True)])
     for ours, other in zip(np.asarray(found, float), theirs, strict=True):
@@ -61,7 +66,9 @@ def test_it_is_the_solver_of_the_cpu():
     starts = rng.uniform(LOW + 0.2, HIGH - 0.2, (20, 7))
     poses = np.stack([tcp_pose(rng.uniform(LOW, HIGH)) for _ in starts])
     poses[:3, :3, 3] = (3.0, 0.0, 0.2)  # out of reach
-    found, error = reach_poses(jnp.asarray(poses, jnp.float32), jnp.asarray(starts, jnp.float32))
+    found, error = jax.jit(reach_poses)(
+        jnp.asarray(poses, jnp.float32), jnp.asarray(starts, jnp.float32)
+    )
     found = np.asarray(found, float)
     assert (found >= LOW - 1e-6).all() and (found <= HIGH + 1e-6).all()
     assert (np.asarray(error)[:3] > 1.0).all() and np.isfinite(found).all()
@@ -132,13 +139,13 @@ def test_clouds_lead_to_joint_angles(objects, monkeypatch):
 
     monkeypatch.setattr("manipose_mj.batch.perception.reaching.estimate_batch", estimates)
     cloud = jnp.zeros((4, 256, 3))
-    found, choice = estimate_and_choose(
-        Knows(seen),  # pyright: ignore[reportArgumentType]
+    estimator: Any = Knows(seen)
+    found, choice = jax.jit(partial(estimate_and_choose, estimator))(
         cloud, cloud, jnp.ones((4, 256), bool), jnp.asarray(cameras), jnp.asarray(rows), grasp_table(objects),
         key=jax.random.key(0),
     )  # fmt: skip
     np.testing.assert_allclose(found, labels, atol=1e-5)
-    expected = choose_grasps(
+    expected = jax.jit(choose_grasps)(
         jnp.asarray(labels, jnp.float32), jnp.asarray(rows), grasp_table(objects)
     )
     np.testing.assert_allclose(choice.joints, expected.joints, atol=1e-2)
