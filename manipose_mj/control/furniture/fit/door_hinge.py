@@ -19,6 +19,7 @@ _WIDE = 0.5  # of the panel's width, from which on a level bar is a flap's
 _WIDEST = 0.85  # of doors about upright hinges: two of them take up what is wider [m]
 _TALL = 1.5  # times as high as wide: no flap, unless its bar is wide
 _AT_EDGE = 0.25  # how far from an edge of the panel an upright hinge may be, of the panel's width
+_BESIDE = 0.5  # how far towards an upright hinge a handle may be from the middle of the panel, of its half
 _INWARDS = 0.02  # how much a handle goes into the body at most as its door opens [m/rad]
 _CORNER = 0.6  # across: beyond it no flap has its handle
 # Of a front, which may be curved: how far its points are from its plane, how wide a strip of it is looked at to either side
@@ -52,20 +53,34 @@ def can_be_a_door(
     axis: Float[np.ndarray, "3"],
     handle: Float[np.ndarray, "4 4"],
     panel: Float[np.ndarray, "2 3"],
+    length: float = 0.0,
 ) -> bool:
-    """Whether a hinge is upright near an edge of the panel, or level with the handle in the middle, and opens outwards.
+    """Whether a hinge is level with the handle in the middle, or upright and near an edge of the panel, and opens outwards.
 
-    All in the object frame, as of `likely_hinge`.
+    No handle is beside an upright hinge, nor is it a wide bar across the door. All in the object frame, as of `likely_hinge`.
     """
     if np.cross(axis, handle[:3, 3] - origin)[0] < -_INWARDS:
         return False
     if abs(axis[1]) > _STRAIGHT:
         width, height = np.ptp(panel[:, 1:], axis=0)
         return abs(float(_away(handle, panel)[1])) < _CORNER and bool(height < _TALL * width)
-    panel = _one_of_two(handle, panel)
-    width = float(np.ptp(panel[:, 1]))
-    at_edge = float(np.abs(panel[:, 1] - origin[1]).min()) < _AT_EDGE * width
-    return abs(float(axis[2])) > _STRAIGHT and at_edge
+    if is_wide_bar(handle, panel, length):
+        return False
+    panel = one_of_two(handle, panel)
+    side = float(np.sign(origin[1] - handle[1, 3]))
+    off_edge = abs(float(panel[1 if side > 0 else 0, 1] - origin[1]))
+    at_edge = off_edge < _AT_EDGE * float(np.ptp(panel[:, 1]))
+    away_from_handle = side * float(_away(handle, panel)[1]) < _BESIDE
+    return abs(float(axis[2])) > _STRAIGHT and at_edge and away_from_handle
+
+
+def is_wide_bar(
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"], length: float
+) -> bool:
+    """Whether a handle lies level across the middle of a panel and takes up most of its width: a flap's, or a drawer's."""
+    across, upright = np.abs(handle[1:3, 0])
+    wide = length > _WIDE * float(np.ptp(panel[:, 1]))
+    return bool(across > upright and wide and abs(_away(handle, panel)[1]) < _ACROSS)
 
 
 def whole_front(
@@ -124,6 +139,18 @@ def _filled(
     ]
 
 
+def one_of_two(
+    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "2 3"]:
+    """The half of a panel that has the handle, where it is too wide for one upright door."""
+    middle = panel[:, 1].mean()
+    if np.ptp(panel[:, 1]) < _WIDEST:
+        return panel
+    half = panel.copy()
+    half[1 if handle[1, 3] < middle else 0, 1] = middle
+    return half
+
+
 def hung(
     origin: Float[np.ndarray, "3"],
     axis: Float[np.ndarray, "3"],
@@ -171,11 +198,11 @@ def likely_hinge(
     """
     along, away = np.abs(handle[:3, 0]), _away(handle, panel)
     middle, half = panel.mean(axis=0), np.ptp(panel, axis=0) / 2
-    wide = length > _WIDE * 2 * half[1]
     edge = abs(away[2]) > _UPRIGHT and half[2] < _TALL * half[1]
-    level = along[1] > along[2] and abs(away[1]) < _ACROSS and (wide or edge)
+    edge = along[1] > along[2] and abs(away[1]) < _ACROSS and edge
+    level = edge or is_wide_bar(handle, panel, length)
     if not level:
-        panel = _one_of_two(handle, panel)
+        panel = one_of_two(handle, panel)
         away, middle, half = _away(handle, panel), panel.mean(axis=0), np.ptp(panel, axis=0) / 2
     across = 2 if level else 1
     side = -1.0 if away[across] > (-_UPRIGHT if level else 0.0) else 1.0
@@ -184,18 +211,6 @@ def likely_hinge(
     axis = np.zeros(3)
     axis[1 if level else 2] = -side if level else side
     return origin, axis
-
-
-def _one_of_two(
-    handle: Float[np.ndarray, "4 4"], panel: Float[np.ndarray, "2 3"]
-) -> Float[np.ndarray, "2 3"]:
-    """The half of a panel that has the handle, where it is too wide for one upright door."""
-    middle = panel[:, 1].mean()
-    if np.ptp(panel[:, 1]) < _WIDEST:
-        return panel
-    half = panel.copy()
-    half[1 if handle[1, 3] < middle else 0, 1] = middle
-    return half
 
 
 def _away(

@@ -15,6 +15,7 @@ from manipose_mj.control.furniture.fit.door_hinge import (
     hung,
     is_level,
     likely_hinge,
+    one_of_two,
     whole_front,
 )
 from manipose_mj.control.furniture.fit.object_frame import AJAR
@@ -126,6 +127,11 @@ class ShutPart:
         return self.measured and float(self.half.max()) > _LONG_BAR
 
     @property
+    def hangs_from_bar(self) -> bool:
+        """Whether it is an appliance's door, or drawer, below a long level bar: no knob is below that bar on its front."""
+        return self.bar_on_top and self.measured and float(self.half[1]) > _LONG_BAR
+
+    @property
     def shows(self) -> bool:
         """Whether more than the network tells of it: its handle stands out, or it is open."""
         return self.measured or self.opening > 0.0 or self.sensed.certain
@@ -216,7 +222,8 @@ class ShutPart:
         if front is not None:
             flat = whole_front(facing, front, self.handle, between, _FLAT)
             between = whole_front(facing, front, self.handle, between)
-        possible = can_be_a_door(self.origin, self.axis, self.handle, between)
+        length = 2 * float(self.half.max()) if self.measured else 0.0
+        possible = can_be_a_door(self.origin, self.axis, self.handle, between, length)
         askew = not possible or np.abs(self.axis).max() < _SNAP
         if askew and self.opening == 0.0 and any(map(self._is_in_a_row_with, others)):
             self.kind, self.axis = "slide", np.array([1.0, 0.0, 0.0])
@@ -224,10 +231,18 @@ class ShutPart:
         elif not possible:
             self.handle = invert(self.back) @ self.handle
             self.opening, self.back = 0.0, np.eye(4)
-            length = 2 * float(self.half.max()) if self.measured else 0.0
             self.origin, self.axis = likely_hinge(self.handle, between, length)
-        elif front is not None and np.abs(self.axis).max() >= _SNAP:
-            self._turn_about_edge(flat if is_level(self.axis) else between)
+        elif front is not None:
+            self._straighten_hinge()
+            panel = flat if is_level(self.axis) else one_of_two(self.handle, between)
+            self._turn_about_edge(panel)
+
+    def _straighten_hinge(self) -> None:
+        """Have the hinge upright or level, through where it is abreast of the handle."""
+        along = int(np.abs(self.axis).argmax())
+        further = (self.handle[along, 3] - self.origin[along]) / self.axis[along]
+        self.origin = self.origin + further * self.axis
+        self.axis = np.eye(3)[along] * np.sign(self.axis[along])
 
     def _turn_about_edge(self, panel: Float[np.ndarray, "2 3"]) -> None:
         """Have the hinge at the edge of the panel that it is beyond, or not far within."""
@@ -362,6 +377,8 @@ def between_neighbours(
         away = other.handle[:3, 3] - own
         axis = 2 if abs(away[2]) > abs(away[1]) else 1
         if abs(away[axis]) < 0.05:
+            continue
+        if axis == 2 and away[2] < 0.0 and part.hangs_from_bar and not other.is_bar:
             continue
         middle = own[axis] + away[axis] / 2
         if axis == 2 and bar:

@@ -49,7 +49,9 @@ def test_a_door_turns_about_the_edge_that_is_farthest_from_its_handle(
         (-Z, -0.29, (0.07, 0.4), True),
         (-Z, -0.1, (0.07, 0.4), False),  # in the middle of its panel
         (Z, -0.29, (0.07, 0.4), False),  # it would open into the body
-        (Z, -0.29, (-0.28, 0.4), True),  # its handle is at the hinge, which says nothing
+        (-Z, -0.29, (-0.15, 0.4), True),
+        (-Z, -0.29, (-0.24, 0.4), False),  # its handle is beside the hinge
+        (Z, 0.08, (0.03, 0.4), False),
         (-Y, 0.0, (-0.1, 0.57), False),
         (Y, 0.0, (-0.1, 0.57), True),
         (Y, 0.0, (0.07, 0.57), False),  # no flap has its handle in a corner
@@ -67,6 +69,9 @@ def test_a_wide_level_bar_is_a_flaps_that_opens_downwards():
     origin, axis = likely_hinge(pose, PANEL, length=0.3)
     np.testing.assert_allclose(axis, Y)
     assert origin[2] == pytest.approx(PANEL[0, 2])
+    upright = np.array([0.2, -0.29, 0.3]), -Z
+    assert can_be_a_door(*upright, pose, PANEL, length=0.12)
+    assert not can_be_a_door(*upright, pose, PANEL, length=0.3)
 
 
 @pytest.mark.parametrize("curved", [0.0, 0.02])

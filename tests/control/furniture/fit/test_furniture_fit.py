@@ -285,6 +285,16 @@ def test_what_has_a_drawers_handle_beside_it_slides_too_unless_its_hinge_is_a_do
     assert sum(part.hinged for part in model.parts) == hinged
 
 
+def test_a_hinge_that_was_sensed_askew_is_upright_and_at_the_edge():
+    way = rotation_about(X, 0.4) @ Z
+    part = sensed("hinge", [FRONT + 0.03, -0.2, 0.3], origin=np.array([FRONT, 0.2, 0.3]), axis=way)
+    (found,) = fit_furniture(
+        cloud([*body(), knob(-0.2)]), SensedFurniture(X, (part,)), "cabinet"
+    ).parts
+    np.testing.assert_allclose(found.part.joint.axis, Z, atol=1e-6)
+    assert found.part.joint.origin[1] == pytest.approx(HALF, abs=0.02)
+
+
 def surest(seen: SceneCloud, parts: tuple[SensedPart, ...], category: str) -> PartModel:
     """What is made of sensed parts, the surest."""
     model = fit_furniture(seen, SensedFurniture(X, parts), category)
@@ -320,6 +330,15 @@ def test_the_door_of_an_oven_ends_above_the_bar_of_the_drawer_below():
     found = surest(cloud([*body(), *bars]), (door, below), "oven")
     np.testing.assert_allclose(found.part.joint.axis, Y, atol=1e-6)
     assert found.part.joint.origin[2] == pytest.approx(0.106 + 0.05 - HEIGHT / 2, abs=0.01)
+
+
+def test_no_knob_ends_the_door_of_an_oven_below_its_bar():
+    wide = rectangle(np.array([FRONT + 0.03, -0.2, 0.42]), 0.4 * Y, 0.012 * Z, X)
+    door = sensed("hinge", [FRONT + 0.03, 0.0, 0.426], handle=level(0.426))
+    phantom = sensed("hinge", [FRONT + 0.03, 0.0, 0.3], confidence=0.4)
+    found = surest(cloud([*body(), wide, knob(0.0)]), (door, phantom), "oven")
+    np.testing.assert_allclose(found.part.joint.axis, Y, atol=1e-6)
+    assert found.part.joint.origin[2] == pytest.approx(-HEIGHT / 2, abs=0.03)
 
 
 def test_double_doors_are_as_wide_though_pictures_end_before_one_does():
