@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -201,7 +202,9 @@ def run_and_report(config, *, resume: bool) -> int:
         def show(done, total) -> None:
             progress.update(len(done), total, f"{sum(r.success_at_end for r in done)} succeeded")
 
+        began = os.getcwd()
         results = run(config, resume=resume, on_progress=show)
+        os.chdir(began)  # a policy may have changed it
     with output.working_on("drawing the report"):
         report = write_report(config.out, jobs=config.jobs)
     console = output.standard_output()

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
+import time
+from functools import cache
 from pathlib import Path
 
 from manipose_mj.errors import InputError
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+_PARENT_S = 1.0  # how often a worker looks for its parent
 
 
 def one_thread_per_process() -> None:
@@ -35,6 +40,19 @@ def keep_to_avx2() -> None:
         os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
         # As NumPy 2.4 names them; https://numpy.org/doc/stable/reference/simd/build-options.html
         os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", "X86_V4 AVX512_ICL AVX512_SPR")
+
+
+@cache
+def end_with_parent() -> None:
+    """Have this process, a worker, end within seconds of its parent's end, however that was killed."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def prepare_workers(jobs: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -224,6 +224,20 @@ class EvaluationConfig:
         """Raise `InputError`, one line that names them, where the user has not built all that the protocol asks for."""
         if self.protocol is not None:
             find_assets(self.protocol, self.tasks, self.assets)
+
+    def independent_of_folder(self) -> EvaluationConfig:
+        """The same for workers in another folder, and for policies and estimators that change it: with absolute paths."""
+        from manipose_mj.tasks.core.object_selection import is_folder  # loads the simulator
+
+        objects = self.objects and tuple(
+            str(Path(each).absolute()) if is_folder(each) else each for each in self.objects
+        )
+        assets = tuple(str(Path(each).absolute()) for each in self.assets)
+        record = self.planner.record and self.planner.record.absolute()
+        planner = replace(self.planner, record=record)
+        return replace(
+            self, out=self.out.absolute(), objects=objects, assets=assets, planner=planner
+        )
 
     def objects_of(self, task: str) -> tuple[str, ...] | None:
         """What the episodes of a task use instead of built-in objects, as `objects`."""

@@ -318,7 +318,7 @@ def scene_model(config: EnvConfig, spec: EpisodeSpec) -> mujoco.MjModel:
 class _Recorder:
     def __init__(self, environment: composer.Environment, policy: Policy) -> None:
         self._data = environment.physics.data
-        self._policy = policy
+        self._baseline = policy if isinstance(policy, BaselinePolicy) else None
         self._times: list[float] = []
         self._positions: list[np.ndarray] = []
         self._annotations: list[str] = []
@@ -330,7 +330,7 @@ class _Recorder:
     def record(self) -> None:
         self._times.append(float(self._data.time))
         self._positions.append(np.array(self._data.qpos, np.float32))
-        self._annotations.append(str(getattr(self._policy, "status", "")))
+        self._annotations.append("" if self._baseline is None else self._baseline.status)
 
     def trajectory(self) -> Trajectory:
         return Trajectory(np.array(self._times), np.stack(self._positions), self._annotations)

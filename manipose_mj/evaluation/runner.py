@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from dm_control.rl.control import PhysicsError
 
 from manipose_mj.console.cluster import cluster
+from manipose_mj.console.process import end_with_parent
 from manipose_mj.control.perception.source_names import GraspSource
 from manipose_mj.errors import InputError, ServerAbsentError, ServerLostError, worker_deaths
 from manipose_mj.estimators.loading import load_estimator
@@ -163,7 +164,9 @@ def evaluate(
       WorkerDiedError: A worker process was killed, or the server of a method; what had ended is kept.
     """
     config.check_assets()
-    config, metadata = _checked_policy(config)
+    given = config
+    config, metadata = _checked_policy(config.independent_of_folder())
+    told = replace(given, policy=config.policy)
     said = {"policy metadata": metadata, "estimator metadata": _estimator_metadata(config)}
     if runner is None:
         _check_protocol(config)
@@ -173,7 +176,7 @@ def evaluate(
         if config.dask is None:  # workers elsewhere may have keys of their own
             config.planner.language_model()
         runner = BaselineRunner(config.planner, config.estimator, config.errors, config.grasps)
-    identity = {**config.identity, **{f"{k} version": v for k, v in versions().items()}, **said}
+    identity = {**told.identity, **{f"{k} version": v for k, v in versions().items()}, **said}
     del identity["platform version"]  # a new kernel changes no result
     seeds = {
         (task, episode): config.episode_seed(task, episode)
@@ -188,7 +191,7 @@ def evaluate(
                 **identity,
                 "masks": config.mask_source,
                 "jobs": config.jobs,
-                "command": config.command,
+                "command": told.command,
                 "machine": machine(),
             }
             write_atomically(config.out / RUN_FILE, _json(run))
@@ -201,7 +204,7 @@ def evaluate(
             results.append(result)
             on_progress(results, total)
         write_sorted(config.out / RESULTS_FILE, results)
-        write_atomically(config.out / SUMMARY_FILE, _json(_summary(config, results)))
+        write_atomically(config.out / SUMMARY_FILE, _json(_summary(told, results)))
     return sorted(results, key=lambda r: r.key)
 
 
@@ -223,13 +226,19 @@ def _checked_policy(config: EvaluationConfig) -> tuple[EvaluationConfig, dict[st
 
         for task in config.tasks:
             environment_of(config.env_config(task))
-    if config.jobs > 1 or config.dask is not None:
+    if _has_workers(config):
         load_policy.cache_clear()  # workers make their own
         getattr(policy, "close", lambda: None)()
     # In batched worlds nobody attaches a policy.
     attachment = attachment_of(policy) if config.batch is None else None
     told = replace(config, policy=replace(config.policy, attachment=attachment))
     return told, metadata_of(policy)
+
+
+def _has_workers(config: EvaluationConfig) -> bool:
+    """Whether other processes run the episodes."""
+    several = config.jobs > 1 and len(config.tasks) * config.episodes > 1
+    return several or config.dask is not None
 
 
 def _check_protocol(config: EvaluationConfig) -> None:
@@ -248,7 +257,7 @@ def _estimator_metadata(config: EvaluationConfig) -> dict[str, Any]:
         return {}
     service = load_estimator(config.estimator)
     said = metadata_of(service.estimator)
-    if config.jobs > 1 or config.dask is not None:
+    if _has_workers(config):
         service.close()  # workers make their own
         load_estimator.cache_clear()
     return said
@@ -271,7 +280,7 @@ def _outcomes(
             ),
         )
         return
-    if config.dask is None and (config.jobs == 1 or len(episodes) <= 1):
+    if not _has_workers(config):
         for task, episode in episodes:
             yield run_one(config, runner, task, episode)
         return
@@ -283,23 +292,17 @@ def _outcomes(
         # Batches would hold finished episodes back.
         options: Any = {"return_as": "generator_unordered", "batch_size": 1}
         pool: Any = joblib.Parallel(n_jobs=min(config.jobs, len(episodes)), **options)
-        wherever = _independent_of_folder(config)
-        outcomes = pool(joblib.delayed(run_one)(wherever, runner, *key) for key in episodes)
+        run = _run_in_worker if config.dask is None else run_one
+        outcomes = pool(joblib.delayed(run)(config, runner, *key) for key in episodes)
     with worker_deaths(f"finished episodes are kept in {config.out}: repeat with --resume"):
         yield from outcomes
 
 
-def _independent_of_folder(config: EvaluationConfig) -> EvaluationConfig:
-    """The same evaluation for workers that run in another folder."""
-    if config.dask is None:
-        return config
-    from manipose_mj.tasks.core.object_selection import is_folder
-
-    objects = config.objects and tuple(
-        str(Path(each).absolute()) if is_folder(each) else each for each in config.objects
-    )
-    assets = tuple(str(Path(each).absolute()) for each in config.assets)
-    return replace(config, out=config.out.absolute(), objects=objects, assets=assets)
+def _run_in_worker(
+    config: EvaluationConfig, runner: Runner, task: str, episode: int
+) -> EpisodeResult:
+    end_with_parent()
+    return run_one(config, runner, task, episode)
 
 
 def run_one(config: EvaluationConfig, runner: Runner, task: str, episode: int) -> EpisodeResult:

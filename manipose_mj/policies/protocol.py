@@ -106,10 +106,11 @@ def checked_answer(answer: Any, size: int) -> Decision:
             raise StageFailure("policy", "'done' is neither true nor false") from None
     try:
         if np.iscomplexobj(values):
-            raise TypeError
+            raise TypeError(f"complex numbers: {values!r:.60}")
         actions = np.asarray(values, float)
-    except Exception:  # of whichever library they are
-        raise StageFailure("policy", f"the actions are no numbers: {values!r:.80}") from None
+    except Exception as error:  # of whichever library they are
+        why = " ".join(f"{type(error).__name__}: {error}".split())
+        raise StageFailure("policy", f"the actions are no numbers: {why:.160}") from None
     least = 0 if done else 1
     if actions.ndim != 2 or actions.shape[1] != size or len(actions) < least:
         raise StageFailure(

@@ -93,6 +93,23 @@ def test_kill_and_resume_loses_and_repeats_nothing(tmp_path: Path, jobs: int) ->
     assert resumed == timeless(tmp_path / "whole" / "results.jsonl")
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_policy_may_change_its_folder(tmp_path: Path, monkeypatch, jobs: int) -> None:
+    monkeypatch.chdir(tmp_path)
+    plain = fake.make_runner()
+
+    def wandering(*args, **options):
+        os.chdir("/")
+        return plain(*args, **options)
+
+    results = evaluate(config(Path("out"), jobs=jobs, episodes=2), runner=wandering)
+    out = tmp_path / "out"
+    assert read_results(out / "results.jsonl")[0] == results
+    assert (out / "summary.json").is_file()
+    for result in results:
+        read_trajectory(records.trajectory_path(out, result.task, result.episode))
+
+
 def test_resume_runs_only_what_is_missing(tmp_path: Path) -> None:
     diary = tmp_path / "diary"
     out = tmp_path / "out"

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 from contextlib import suppress
 from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 from manipose_mj.errors import InputError, RecordError
 
 Message = dict[str, str]
 INSTRUCTION = "\n\nInstruction: "  # in a first question, between the scene and what is wanted
-_WORDS = {str: "text", dict: "object"}
+_NUMBER, _INDEX = int | float, int | None
+_WORDS: dict[Any, str] = {
+    str: "text", dict: "object", list: "list", int: "whole number", bool: "true or false",
+    _NUMBER: "number", _INDEX: "whole number or null",
+}  # fmt: skip
 _KINDS: dict[str, Any] = {
     "model": str,
     "parameters": dict,
@@ -23,7 +29,10 @@ _KINDS: dict[str, Any] = {
     "task": str,
     "number": int,
     "instruction": str,
-    "at": int | float,
+    "at": _NUMBER,
+    "seconds": _NUMBER,
+    "cut": bool,
+    "episode": _INDEX,
 }
 
 
@@ -106,13 +115,23 @@ def append_exchange(path: Path, exchange: Exchange) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(exchange)) + "\n")
+        with path.open("a+b") as file:
+            _drop_unfinished_line(file)
+            file.write((json.dumps(asdict(exchange)) + "\n").encode("ascii"))
     except OSError as error:
         raise RecordError(
             f"{path}: exchanges cannot be written there ({error.strerror or error}); "
             "make room, or choose another --out"
         ) from None
+
+
+def _drop_unfinished_line(file: IO[bytes]) -> None:
+    """Of a process of the same number that was killed."""
+    if file.seek(0, os.SEEK_END):
+        file.seek(-1, os.SEEK_END)
+        if file.read(1) != b"\n":
+            file.seek(0)
+            file.truncate(file.read().rfind(b"\n") + 1)
 
 
 def read_exchanges(path: Path) -> list[Exchange]:
@@ -166,7 +185,10 @@ def _record(document: Any) -> Exchange:
     record = Exchange(**document)
     for name, kind in _KINDS.items():
         if not isinstance(getattr(record, name), kind):
-            raise TypeError(f"field {name!r} is no {_WORDS.get(kind, kind.__name__)}")
+            raise TypeError(f"field {name!r} is no {_WORDS[kind]}")
+    for name in ("at", "seconds"):
+        if not math.isfinite(getattr(record, name)):
+            raise TypeError(f"field {name!r} is no finite number")
     if not all(isinstance(message, dict) for message in record.messages):
         raise TypeError("field 'messages' is no list of messages")
     return record

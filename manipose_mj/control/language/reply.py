@@ -163,7 +163,7 @@ def _json_in(text: str) -> Any:
     if last is not None:
         return last
     raise InputError(
-        f"reply: not valid JSON ({mistake}); answer with the JSON object only, without fences or other text"
+        f"reply: not valid JSON ({mistake}); answer with the JSON object only, its text in straight double quotes"
     )
 
 

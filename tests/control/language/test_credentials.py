@@ -61,9 +61,10 @@ def test_credentials_that_are_sent_back_are_not_told(serve, monkeypatch, key, us
         f"incorrect key: {KEY[:12]}",
         f"incorrect key: {KEY[-12:]}",
         f"incorrect key: {KEY[:5]}*****{KEY[-4:]}",
+        f"incorrect key: {KEY[:4]}...{KEY[-4:]}",
         "incorrect key: Bearer of-another",
     ],
-    ids=["start", "end", "masked", "header"],
+    ids=["start", "end", "masked", "shortened", "header"],
 )
 def test_parts_of_a_key_are_not_told(serve, said):
     server = serve(refuses("model", said), says(said))

@@ -75,7 +75,7 @@ def test_a_plan_is_found_wherever_a_model_puts_it(text):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("I would open it.", "answer with the JSON object only, without fences or other text"),
+        ("I would open it.", "answer with the JSON object only, its text in straight double quotes"),
         ("[" * 100_000, "not valid JSON"),
         ("9" * 5000, "not valid JSON|expected an object"),
         (json.dumps({"plan": [GRASP, POSES, RELEASE]}), r"plan\[1\]: no field 'poses'"),
@@ -164,6 +164,35 @@ def test_files_of_records_that_cannot_be_read_are_told(tmp_path):
     path = tmp_path / "1.jsonl"
     path.write_bytes(b"\xff\n")
     with pytest.raises(InputError, match=r"cannot be read \(no text in UTF-8\)$"):
+        read_exchanges(path)
+
+
+def test_a_line_that_a_killed_process_left_unfinished_is_dropped_by_the_next_of_its_number(
+    tmp_path,
+):
+    path, exchanges = tmp_path / "1.jsonl", [Exchange("m", {}, [], {}, str(i)) for i in range(3)]
+    append_exchange(path, exchanges[0])
+    path.write_bytes(path.read_bytes() + b'{"model": "m", "par')
+    for exchange in exchanges[1:]:
+        append_exchange(path, exchange)
+    assert read_exchanges(path) == exchanges
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("episode", "[1]", "whole number or null"),
+        ("cut", '"no"', "true or false"),
+        ("seconds", '"x"', "number"),
+        ("at", "NaN", "finite number"),
+    ],
+)
+def test_a_damaged_field_is_named(tmp_path, field, value, said):
+    path = tmp_path / "1.jsonl"
+    append_exchange(path, Exchange("m", {}, [], {}, "one"))
+    document = json.loads(path.read_text()) | {field: "HERE"}
+    path.write_text(json.dumps(document).replace('"HERE"', value) + "\n")
+    with pytest.raises(InputError, match=f"line 1: .*field '{field}' is no {said}"):
         read_exchanges(path)
 
 
