@@ -29,7 +29,7 @@ from manipose_mj.policies.baseline import BaselinePolicy
 from manipose_mj.policies.loading import load_policy
 from manipose_mj.tasks.core.config import EnvConfig, EpisodeSpec
 from tests.few_objects import config, few
-from tests.policies.own_policies import Breaking, Peeking, Reaching, answering_narrow
+from tests.policies.own_policies import Breaking, Peeking, Reaching, Reporting, answering_narrow
 from tests.policies.test_remote import served
 
 TASK = "single_object/target_pose"
@@ -179,6 +179,15 @@ def test_a_policy_that_raises_fails_its_episodes_and_leaves_a_traceback(tmp_path
     others = [replace(results[0], episode=i, failure="plan", reason="no way") for i in (1, 2)]
     lines = common_reasons([*others, *results], tmp_path)
     assert lines == [line.replace("1 of 1", "1 of 3"), "failed in plan, 2 of 3: no way"]
+
+
+def test_a_policy_is_made_once_and_asked_for_actions_alone(tmp_path):
+    load_policy.cache_clear()
+    Reporting.made = 0
+    settings = PolicySettings(f"{HERE}:Reporting")
+    (result,) = evaluate(evaluation(tmp_path, settings, episodes=1, jobs=2))
+    assert result.failure != "error"
+    assert Reporting.made == 1
 
 
 def test_a_policy_that_breaks_with_the_goal_met_has_failed(tmp_path, monkeypatch):

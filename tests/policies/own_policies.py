@@ -112,6 +112,25 @@ class Narrowing:
         return {"actions": np.zeros((1, 8 if self.after >= 0 else 7)), "done": True}
 
 
+class Reporting(Reaching):
+    """Has a `status` of its own, which is nobody's business."""
+
+    made = 0
+
+    def __init__(self) -> None:
+        super().__init__()
+        type(self).made += 1
+
+    @property
+    def status(self) -> str:
+        """What only a programmer wants to read.
+
+        Raises:
+          ZeroDivisionError: Always.
+        """
+        raise ZeroDivisionError
+
+
 class Breaking:
     """Stays where it is, once, and then breaks in one of several ways."""
 

@@ -55,6 +55,16 @@ def test_other_answers_are_failures_of_the_policy(answer, said):
     assert caught.value.stage == "policy" and "\n" not in caught.value.reason
 
 
+class OnAGpu:
+    def __array__(self, dtype=None, copy=None):
+        raise TypeError("can't convert a tensor on a GPU; call cpu() first")
+
+
+def test_the_library_s_reason_is_told():
+    with pytest.raises(StageFailure, match=r"no numbers: TypeError: can't .* call cpu\(\) first$"):
+        checked_answer({"actions": OnAGpu()}, 8)
+
+
 def test_the_width_of_an_answer_is_known_where_it_has_one():
     assert answered_width({"actions": np.zeros((2, 7))}) == 7
     assert answered_width(np.zeros((2, 7))) == 7
