@@ -12,7 +12,9 @@ _LEAST = 8  # characters of a part of a secret that is one itself; most words of
 _LEAST_WITHIN = 4  # characters of a secret that is found within words; "x" is in most of them
 # What follows the scheme of a header, and what somebody else has masked but for its ends.
 _AUTHORIZATION = re.compile(r"\b(basic|bearer)(\s+)[^\s\"',;]+", re.IGNORECASE)
-_MASKED = re.compile(r"(?<![\w-])[\w-]*(?:\*{3,}|\.{3}(?=\w))[\w*-]*")
+_MASKED = re.compile(
+    r"(?<![\w-])(?:[\w-]*\*{3,}[\w*-]*|(?=[\w.-]*[\d-])[\w-]+\.{3}[\w-]+)"  # sk-a...1234; no "wait...then"
+)
 HIDDEN = "***"
 
 
