@@ -30,6 +30,9 @@ os.environ.setdefault("MPLCONFIGDIR", str(_KEPT / "matplotlib"))
 # Both workers compile much the same, and so does the next run. Read when JAX is imported.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.05")
+# Compiled quickly rather than well, and kept from users of this checkout.
+os.environ.setdefault("NUMBA_OPT", "0")
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_KEPT / "numba"))
 # Read when JAX first computes.
 _FLAGS = "--xla_cpu_multi_thread_eigen=false"
 if Version(version("jaxlib")) < Version("0.11"):
